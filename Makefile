@@ -18,8 +18,11 @@ setup: $(STAMP) $(SYSTEM)
 demo: setup
 	$(BIN)/toolkit demo --out demo-out
 
-test: setup check $(BROWSER)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal
+# The checks run beside the tests: without a cache the types take a minute, on one core. Both are told, and either fails.
+test: setup $(BROWSER)
+	@$(MAKE) --no-print-directory check >$(VENV)/check.log 2>&1 & checks=$$!; \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n $(JOBS) --dist worksteal; tests=$$?; \
+	wait $$checks; checked=$$?; cat $(VENV)/check.log; exit $$((tests ? tests : checked))
 
 check: $(STAMP)
 	$(BIN)/ruff format --check --quiet

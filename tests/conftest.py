@@ -55,11 +55,16 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-# An audit's worker begins as a new interpreter, 0.4 s of imports each. In tests all come of one process that
-# has these behind it; `test_workers.py` holds what a user's computer does by scripts of its own.
+# An audit's worker begins as a new interpreter, 0.4 s of imports each, and a job of the workbench as two, 2 s
+# each. In tests all come of one process that has these behind it; `test_workers.py` holds what a user's
+# computer does by scripts of its own, and `tests/lab/desk/test_jobs.py` a job.
 if can_fork():
     _READY = multiprocessing.get_context("forkserver")
-    _READY.set_forkserver_preload(["toolkit.audit.archive"])
+    _READY.set_forkserver_preload([
+        "toolkit.audit.archive", "tests.workbench.kept_runner", "toolkit.lab.plans.plan_session",
+        "toolkit.lab.tire_tests.reports", "toolkit.lab.studies.diagnosis",
+        "statsmodels.regression.linear_model",
+    ])  # fmt: skip
     workers.mp = SimpleNamespace(get_context=lambda _: _READY)
 
 remember_fits()

@@ -33,6 +33,8 @@ from typing import Any
 
 import pytest
 
+from tests.remembered import share, shelves
+
 KILL = 0
 SOURCE = Path(__file__).with_suffix(".c")
 
@@ -95,7 +97,7 @@ class Runner:
     def __enter__(self) -> Runner:
         """Start it."""
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.faults"],
+            [sys.executable, "-m", "tests.faults", *map(str, shelves())],
             env={**os.environ, "LD_PRELOAD": str(library())},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -133,9 +135,13 @@ class Runner:
 
 
 def _serve() -> None:
+    from tests.remembered_fits import remember_fits
     from toolkit.cli.main import command_tree
 
     command_tree()
+    if folders := sys.argv[1:]:  # of a run of the tests: what is fitted is none of what fails
+        remember_fits()
+        share(Path(folders[0]))
     for line in sys.stdin:
         with tempfile.TemporaryDirectory() as place:
             sys.stdout.write(json.dumps(_forked(json.loads(line), Path(place))) + "\n")

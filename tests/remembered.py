@@ -23,6 +23,11 @@ def share(folder: Path) -> None:
     _shelves[:] = [folder]
 
 
+def shelves() -> list[Path]:
+    """Return the folder in which answers are kept; none outside a run of the tests."""
+    return _shelves[:]
+
+
 def once(question: object, ask: Callable[[], Any]) -> Any:
     """Return a copy of the answer to a question of this content; what is raised is raised anew each time."""
     key = hashlib.sha256(pickle.dumps(question)).digest()

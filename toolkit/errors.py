@@ -63,8 +63,11 @@ class ToolkitError(Exception):
         self.rule = rule
 
     def __str__(self) -> str:
-        """Return the error as lines: what first, then each part that is known."""
-        parts = [self.what]
+        """Return the error as lines: what first, then each part that is known.
+
+        Parts name files and quote them: no line of a part begins where a line of the error does.
+        """
+        parts = [_inside(self.what)]
         for label, text in (
             ("where", self.where),
             ("line", self.line),
@@ -73,7 +76,7 @@ class ToolkitError(Exception):
             ("next", self.next_step),
         ):
             if text is not None:
-                parts.append(f"  {label + ':':<10}{text}")
+                parts.append(f"  {label + ':':<10}{_inside(text)}")
         return "\n".join(parts)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -99,6 +102,15 @@ def _readable(part: object) -> str:
         line if len(line) <= LONGEST else f"{line[:LONGEST]} ... ({len(line)} characters)"
         for line in str(part).split("\n")
     )
+
+
+_INDENT = " " * 12
+
+
+def _inside(part: str) -> str:
+    """Return a part whose lines after the first stand below it; some of them do already."""
+    first, *lines = part.split("\n")
+    return "\n".join([first, *(text if text.startswith(_INDENT) else _INDENT + text for text in lines)])
 
 
 def _rebuild(cls: type[ToolkitError], sentence: str, parts: dict[str, str | None]) -> ToolkitError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import os
 import shutil
 import zipfile
 from pathlib import Path
@@ -12,8 +13,9 @@ import pytest
 
 from tests import commands
 from tests.recording.fig4_4 import write_fig4_4
-from toolkit.audit.archive import audit_archive
+from toolkit.audit.archive import audit_archive, inventory
 from toolkit.calibration.registry.registry import Registry
+from toolkit.errors import ConfigError
 
 HOME = Path(__file__).resolve().parents[2]
 DATED = 'schema = 1\nmachine = "m15"\ndate = 2019-03-01\n'
@@ -114,3 +116,68 @@ def test_an_archive_that_is_no_folder_is_refused(tmp_path):
 
     with pytest.raises(ConfigError, match="archive"):
         audit_archive(tmp_path / "none", Registry(HOME / "calibrations"))
+
+
+def _shut(monkeypatch: pytest.MonkeyPatch, folder: Path, error: OSError) -> None:
+    """Let a folder be one that nobody may list, or that is gone when it is listed."""
+    scandir = os.scandir
+
+    def listed(path):
+        if Path(path) == folder:
+            raise error
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", listed)
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (PermissionError(13, "Permission denied"), "Permission denied"),
+        (FileNotFoundError(2, "No such file or directory"), "No such file or directory"),
+    ],
+)
+def test_a_folder_that_cannot_be_listed_is_told_and_the_others_are_audited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: OSError, said: str
+) -> None:
+    root = tmp_path / "archive"
+    for name in ("a", "shut/below", "z"):
+        (root / name).mkdir(parents=True)
+        (root / name / "notes.txt").write_text("nothing to see\n")
+    monkeypatch.chdir(tmp_path)
+    _shut(monkeypatch, Path("archive/shut"), error)
+    code, answer = commands.answer("audit", "archive", "--calibrations", HOME / "calibrations")
+    assert code == 1
+    assert [file["path"] for file in answer["files"]] == ["a/notes.txt", "z/notes.txt"]
+    (finding,) = [one for one in answer["findings"] if one["rule"] == "unreadable-folder"]
+    assert (finding["where"], finding["level"]) == ("shut", "warning")
+    assert said in finding["message"]
+    _, text, _ = commands.said("audit", "archive", "--calibrations", HOME / "calibrations")
+    assert f"shut: {finding['message']}" in text
+
+
+def test_an_archive_that_cannot_be_listed_cannot_be_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _shut(monkeypatch, tmp_path, PermissionError(13, "Permission denied"))
+    with pytest.raises(ConfigError) as refusal:
+        inventory(tmp_path)
+    assert (refusal.value.rule, refusal.value.exit_code) == ("archive", 2)
+
+
+def test_a_folder_of_reports_that_cannot_be_listed_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("archive", "reports/2019", "reports/shut"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "archive" / "notes.txt").write_text("nothing to see\n")
+    (tmp_path / "reports" / "2019" / "tire A.pdf").write_bytes(b"x")
+    monkeypatch.chdir(tmp_path)
+    _shut(monkeypatch, Path("reports/shut"), PermissionError(13, "Permission denied", "reports/shut"))
+    code, answer = commands.answer(
+        "audit", "archive", "--reports", "reports", "--calibrations", HOME / "calibrations"
+    )
+    assert code == 1
+    assert [report["report"] for report in answer["reports"]] == ["2019/tire A.pdf"]
+    (finding,) = [one for one in answer["findings"] if one["level"] != "note"]
+    assert (finding["rule"], finding["where"]) == ("unreadable-folder", "reports/shut")

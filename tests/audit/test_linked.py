@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests import commands
 from tests.audit.archive_made import FY, dated, recording, write
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.linked import RestingReport, link, read_reports
@@ -43,7 +44,7 @@ def test_documents_are_linked_where_their_name_has_the_tests_as_whole_words(made
     for name in ("Report tire B.docx", "2018/final_TIRE-A.pdf", "holiday.pdf", "notes tire A2.bin"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(b"x")
-    linked = link(made, read_reports(tmp_path))
+    linked = link(made, read_reports(tmp_path, []))
     told = by_name(linked)
     assert told["Report tire B.docx"]["tests"] == ["2019/tire B"]
     assert (told["Report tire B.docx"]["files"], told["Report tire B.docx"]["not_clean"]) == (2, 1)
@@ -58,7 +59,7 @@ def test_documents_are_linked_where_their_name_has_the_tests_as_whole_words(made
 def test_recordings_of_the_archive_are_no_reports_where_both_stand_in_one_folder(made, archive):
     (archive / "2019/tire B" / "tire B.pdf").write_bytes(b"x")
     try:
-        linked = link(made, read_reports(archive))
+        linked = link(made, read_reports(archive, []))
     finally:
         (archive / "2019/tire B" / "tire B.pdf").unlink()
     assert list(by_name(linked)) == ["2019/tire B/tire B.pdf"]
@@ -79,7 +80,7 @@ def test_a_manifest_names_the_recordings_and_hides_its_own_outputs(made, archive
     }  # fmt: skip
     (folder / "manifest.json").write_text(json.dumps(manifest))
     (tmp_path / "other.json").write_text("[1, 2")
-    told = by_name(link(made, read_reports(tmp_path)))
+    told = by_name(link(made, read_reports(tmp_path, [])))
     assert list(told) == ["tire B"]
     # What it says of its files is believed, not what its folder is called.
     assert told["tire B"]["tests"] == ["2019/tire A"]
@@ -93,7 +94,7 @@ def test_a_list_links_by_test_by_path_and_by_hash(made, archive, tmp_path):
         f"report,test,sha256\nR 1,tire B,\nR 2,2018/tire A,\nR 3,,{sha}\nR 4,no such test,\n",
         encoding="utf-8-sig",
     )  # fmt: skip
-    told = by_name(link(made, read_reports(tmp_path / "list.csv")))
+    told = by_name(link(made, read_reports(tmp_path / "list.csv", [])))
     assert told["R 1"]["tests"] == ["2019/tire B"]
     assert told["R 2"]["tests"] == ["2018/tire A"]
     assert (told["R 3"]["tests"], told["R 3"]["files"], told["R 3"]["not_clean"]) == ([], 1, 1)  # undated
@@ -114,7 +115,7 @@ def test_a_list_links_by_test_by_path_and_by_hash(made, archive, tmp_path):
 def test_a_list_that_cannot_be_used_is_refused(tmp_path, text, said):
     (tmp_path / "list.csv").write_text(text)
     with pytest.raises(ConfigError) as caught:
-        read_reports(tmp_path / "list.csv")
+        read_reports(tmp_path / "list.csv", [])
     assert said in str(caught.value)
 
 
@@ -124,12 +125,12 @@ def test_links_are_not_followed(made, tmp_path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "tire B.pdf").symlink_to(tmp_path / "real" / "tire B.pdf")
     (tmp_path / "folder" / "sub").symlink_to(tmp_path / "real")
-    assert read_reports(tmp_path / "folder") == ()
+    assert read_reports(tmp_path / "folder", []) == ()
 
 
 def test_there_is_no_such_list(tmp_path):
     with pytest.raises(ConfigError):
-        read_reports(tmp_path / "none.csv")
+        read_reports(tmp_path / "none.csv", [])
 
 
 @pytest.mark.parametrize(
@@ -146,3 +147,28 @@ def test_what_is_to_be_amended(identity, calibrations, not_clean, amend):
         report="R", id=identity, calibrations=calibrations, not_clean=not_clean, in_force={"m15-r2"}
     )
     assert one.to_amend is amend
+
+
+def test_an_archive_and_a_folder_of_reports_that_are_the_test_itself_are_called_by_their_names(
+    tmp_path, monkeypatch
+):
+    test, out = tmp_path / "tire C", tmp_path / "report of tire C"
+    for folder in (test, out):
+        folder.mkdir()
+    dated(test, "2019-06-01")
+    written = test / "one.xlsx"
+    write(written, recording(seed=7))
+    manifest = {
+        "generator": "toolkit", "schema": 1, "report": "T-18",
+        "inputs": [{"name": "a", "sha256": sha256_file(written)}],
+        "calibrations": [{"id": "m15-r1", "sha256": "0" * 64}], "outputs": [],
+    }  # fmt: skip
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / "none").mkdir()
+    monkeypatch.chdir(test)
+    _, said, _ = commands.said(
+        "audit", ".", "--reports", "../report of tire C", "--calibrations", CALIBRATIONS
+    )
+    assert "report report of tire C (tire C): to be amended" in said
+    _, said, _ = commands.said("audit", ".", "--reports", "../none", "--calibrations", CALIBRATIONS)
+    assert "report unknown: 1 test, tire C" in said

@@ -43,7 +43,7 @@ def run(folder: Path, count: int) -> list[dict[str, object]]:
     from toolkit.calibration.registry.registry import Registry
 
     big = make_archive(folder / "big", files=FILES)
-    names = inventory(big.folder)
+    names = inventory(big.folder).files
     registry = Registry(big.calibrations)
     made: list[Any] = []
 

@@ -213,7 +213,10 @@ def after_one_more(
     found = next((effect for effect in diagnosis.effects if effect.equivalent_to), None)
     if found is None:
         return f"no class: {diagnosis.verdict}"
-    true = [name for name in kind[2] if name in (found.name, *found.equivalent_to)]
+    beside = {(effect.name, effect.channel) for effect in diagnosis.effects if effect is not found}
+    # What stands beside the class, at its own place, is none of what the class leaves open.
+    open_effects = [name for name in kind[2] if (name, drawn.effects[name].get("channel")) not in beside]
+    true = [name for name in open_effects if name in (found.name, *found.equivalent_to)]
     if len(true) != 1:
         return "no true effect in the class"
     posed = problem(case)

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from toolkit.cli.console import answer, print_error, say
+from tests import commands
+from toolkit.cli.console import answer, print_error, progress, say
 from toolkit.errors import ConfigError
 
 FULL = Path("/dev/full")
+CHECKOUT = Path(__file__).resolve().parents[2]
+HOMED = ("inspect", "process", "verify", "audit", "fit", "report")
 
 
 @pytest.mark.parametrize(
@@ -105,3 +111,46 @@ def test_an_option_without_its_value_is_named_with_its_command(capsys: pytest.Ca
         run(["calibration", "list", "--known-at"])
     text = capsys.readouterr().err
     assert "where:    toolkit calibration list: --known-at\n  got:      nothing" in text
+
+
+FORGED = "a\nerror: forged\x1b[2J\r\u202e"
+
+
+def _forged(printed: str) -> list[str]:
+    """Return the lines in which the name of a file would speak for the program, or steer the terminal."""
+    lines = printed.split("\n")
+    return [line for line in lines if line.startswith("error: forged") or re.search("[\x1b\r\u202e]", line)]
+
+
+def test_names_and_texts_of_files_write_no_line_of_their_own(tmp_path: Path, virtual_test: Path) -> None:
+    folder = tmp_path / FORGED
+    shutil.copytree(virtual_test, folder)
+    (recording, *_) = sorted(folder.glob("*.xlsx"))
+    recording.rename(folder / f"{FORGED}.xlsx")
+    (folder / f"{FORGED}.csv").write_text(f'SA [deg],"{FORGED[:-2]} [N]",FY [N]\n1,2,3\n')
+    document = tmp_path / f"{FORGED}.pdf"
+    document.write_bytes(b"%PDF-1.7\nnothing of the sort\n")
+    unknown = tmp_path / f"{FORGED}.json"
+    unknown.write_text(json.dumps({"generator": "toolkit", "schema": 1, FORGED: FORGED}))
+    both = (folder / f"{FORGED}.xlsx", folder / f"{FORGED}.csv")
+    for words in (
+        ("inspect", *both), ("inspect", both[1]), ("process", folder), ("process", folder, "--draft"),
+        ("verify", document, unknown), ("audit", tmp_path), ("audit", tmp_path, "--reports", tmp_path),
+        ("convert", both[1], tmp_path / f"{FORGED}.tdx"), ("fit", both[1]), ("template", "check", document),
+        ("report", folder, "--template", document), ("calibrate", unknown), ("diagnose", unknown),
+    ):  # fmt: skip
+        code, said, told = commands.said(*words, *(("--home", CHECKOUT) if words[0] in HOMED else ()))
+        assert code in (0, 1, 2), (words, told)
+        assert said + told
+        assert _forged(said) + _forged(told) == [], words
+
+
+def test_a_bar_shows_any_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name in square brackets is no style of the bar's, and one with an escape steers nothing."""
+    drawn = io.StringIO()
+    drawn.isatty = lambda: True  # type: ignore[method-assign]
+    monkeypatch.setattr("sys.stderr", drawn)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress(2, "audit") as step:
+        step("[/bold]\x1b]0;title\x07.xlsx")
+    assert "\x1b]0;title" not in drawn.getvalue()

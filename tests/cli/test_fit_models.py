@@ -151,7 +151,7 @@ def test_negative_loads_are_loads(tire, tmp_path):
 
 def test_swapped_axes_are_a_finding_and_nothing_is_flipped(tmp_path):
     path = write(tmp_path / "swapped.csv")  # adapted SAE, declared as SAE
-    code, out = run(path, *models("mf52"), "--json")
+    code, out = run(path, *models("brush"), "--json")
     told = json.loads(out)
     assert code == 1
     found = [one for one in told["findings"] if one["rule"] == "axes-contradiction"]

@@ -20,6 +20,7 @@ from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
 from toolkit.planning import protocol_plan as planning
+from toolkit.planning import protocol_search
 from toolkit.planning.sweep_search import least_sweeps
 
 ROOT = Path(toolkit.__file__).resolve().parents[1]
@@ -35,6 +36,12 @@ def run(tmp_path, monkeypatch):
 
 NEAR = LOADS[1:4]
 """Loads of the earlier test about that which is asked for: further ones are tried alike, and take as long."""
+
+
+@pytest.fixture(autouse=True)
+def few_starts(monkeypatch):
+    """A plan is a little longer at most: `test_protocol_search.py` has the exchange from all its starts."""
+    monkeypatch.setattr(protocol_search, "_STARTS", 2)
 
 
 @pytest.fixture
@@ -136,13 +143,23 @@ def test_the_next_run_is_written_with_what_each_member_predicts(run, diagnosed, 
     assert set(plan["members"]) == {"channel_delay on F", "filter_lag on F"}
     assert plan["power"] > 0.9 > plan["power_of_repeat"]
     assert plan["complete"] is True
-    assert sorted(plan["files"]) == ["next.csv", "next_F.png", "operator.txt", "predictions.csv"]
+    assert sorted(plan["files"]) == [
+        "next.csv",
+        "next_F.png",
+        "next_F_apart.png",
+        "operator.txt",
+        "predictions.csv",
+    ]
     header, *rows = (tmp_path / "n" / "next.csv").read_text().splitlines()
     assert header == "t,u"
     assert len(rows) == 500
     predicted = (tmp_path / "n" / "predictions.csv").read_text().splitlines()[0]
     assert set(predicted.split(",")) == {"t", "F_channel_delay_on_F", "F_filter_lag_on_F"}
-    assert re.search(r"as fast as", (tmp_path / "n" / "operator.txt").read_text())
+    operator = (tmp_path / "n" / "operator.txt").read_text()
+    assert re.search(r"as fast as", operator)
+    # The ends of the inputs that were written, and no other.
+    inputs = [float(row.split(",")[1]) for row in rows]
+    assert f"u from {min(inputs):.4g} to {max(inputs):.4g} mm, at most" in operator
 
 
 @pytest.mark.campaign("the sheet of another plan: that of a test is drawn in every run")
@@ -152,7 +169,10 @@ def test_the_sheet_of_the_next_run_draws_what_each_member_predicts(run, diagnose
     planned = run("plan", "next", diagnosed, "--out", "n", "--template", template, "--json")
     assert planned.return_value == 0, planned
     document = json.loads(planned.stdout)["document"]
-    assert [figure["tag"] for figure in document["figures"]] == ["tk:figure.plan_figure_1"]
+    assert [figure["tag"] for figure in document["figures"]] == [
+        "tk:figure.plan_figure_1",
+        "tk:figure.plan_figure_2",
+    ]
     assert "filter_lag on F" in document["figures"][0]["alt"]
     assert (tmp_path / "n" / "plan.pdf").read_bytes().startswith(b"%PDF")
 
@@ -175,12 +195,21 @@ def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
         (["--rate", "u=0"], "NAME=MOST"),
         (["--rate", "u=1..2"], "NAME=MOST"),
         (["--rate", "w=1"], "of u"),
+        (["--limit", "u=-1..1", "--limit", "u=-2..2"], "each input once"),
     ],
 )
 def test_a_limit_that_cannot_be_read(run, diagnosed, arguments, part):
     failed = run("plan", "next", diagnosed, *arguments)
     assert failed.exception.rule == "plan-next"
     assert part in str(failed.exception.expected)
+
+
+def test_limits_within_which_nothing_parts_are_refused_with_what_would(run, diagnosed, tmp_path):
+    failed = run("plan", "next", diagnosed, "--rate", "u=0.01", "--out", "n")
+    error = failed.exception
+    assert (error.rule, error.exit_code) == ("plan-infeasible", 2)
+    assert "channel_delay" in str(error.next_step)
+    assert not (tmp_path / "n").exists()
 
 
 def test_another_case_than_the_answers_is_refused(run, diagnosed, tmp_path):

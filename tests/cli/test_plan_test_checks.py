@@ -19,6 +19,8 @@ from toolkit.lab.plans.protocol_plan import ProtocolOrder, plan_test
         (ProtocolOrder(loads=("100 kN",)), "833"),
         (ProtocolOrder(demands=("conicty=2 N",)), "conicity"),
         (ProtocolOrder(minutes=-5.0), "minutes above 0"),
+        (ProtocolOrder(demands=("FY@25deg=40 N",)), "one of -10, -9"),
+        (ProtocolOrder(demands=("relaxation_length",)), "relaxation_length=NUMBER UNIT"),
     ],
 )
 def test_nothing_is_simulated_for_what_cannot_be_planned(

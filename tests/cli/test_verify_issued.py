@@ -17,7 +17,9 @@ from typing import Any
 
 import pytest
 
+from tests import commands
 from tests.calibration.registry.test_signatures import KEYS, RECORD, _found, _registry, _rewrite
+from tests.trust.seal.authority import to_pem
 from tests.trust.seal.seal_factory import authority, flipped, key, trust
 from toolkit.calibration.records.record import canonical
 from toolkit.calibration.registry.approval import withdraw
@@ -281,11 +283,35 @@ def test_a_record_and_its_ledger_are_verified_too(issued: Issued) -> None:
 def test_a_manifest_that_was_not_issued_still_names_its_records(issued: Issued, tmp_path: Path) -> None:
     sha256 = _registry(issued.home).load(RECORD).sha256
     manifest = tmp_path / "manifest.json"
-    manifest.write_text(json.dumps({"outputs": [], "calibrations": [{"id": RECORD, "sha256": sha256}]}))
+    manifest.write_text(
+        json.dumps(
+            {"outputs": [], "calibrations": [{"id": RECORD, "sha256": sha256}], "tested": "2026-06-01"}
+        )
+    )
     assert issued.verify(manifest).still_holds is True
     withdraw(_registry(issued.home, "anna"), RECORD, on=date(2026, 11, 21), reason="sign", by="anna")
     verdict = issued.verify(manifest)
     assert (verdict.signature, verdict.still_holds, verdict.code) == ("unsigned", False, 1)
+
+
+def test_an_issued_report_says_the_day_of_its_test_to_whoever_verifies_it(
+    virtual_test: Path, tmp_path: Path
+) -> None:
+    home = tmp_path / "home"
+    shutil.copytree(packaged_home(), home)
+    (home / "trust" / "certificates").mkdir(parents=True)
+    (home / "trust" / "certificates" / "root.pem").write_bytes(authority().pem)
+    (tmp_path / "key.pem").write_bytes(to_pem(key()))
+    code, answer = commands.answer(
+        "report", virtual_test, "--out", tmp_path / "out", "--home", home, "--seal", tmp_path / "key.pem"
+    )
+    assert code < 2, answer
+    (line,) = [entry for entry in map(json.loads, _lines(home)) if entry["event"] == "issued"]
+    assert line["document"]["tested"] == "2026-03-17"
+    for name in ("report.pdf", "report.docx", "manifest.json"):
+        code, verdict = commands.answer("verify", tmp_path / "out" / name, "--home", home)
+        assert (code, verdict["signature"], verdict["still_holds"]) == (0, "valid", True), verdict
+        assert "in force on 2026-03-17, the day of the test" in verdict["why"]
 
 
 def test_who_may_not_issue_leaves_nothing(issued: Issued) -> None:

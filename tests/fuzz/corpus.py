@@ -301,7 +301,7 @@ def _read_again(folder: Path) -> object:
 def _read_reports(folder: Path) -> object:
     from toolkit.audit.linked import read_reports
 
-    return read_reports(folder / "reports.csv")
+    return read_reports(folder / "reports.csv", [])
 
 
 def _read_declared(cls: type) -> Callable[[Path], object]:

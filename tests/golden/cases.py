@@ -359,4 +359,4 @@ CASES: dict[str, Callable[[], Files]] = {
     "acquisition-nothing": lambda: acquisition(negative=False),
 }
 """Files of each case by its name."""
-QUICK = ("python-nothing", "cell-nonlinear", "acquisition-sign")
+QUICK = ("python-nothing", "cell-nonlinear")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import gc
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -64,7 +65,17 @@ def read_package(root: Path = ROOT) -> Sequence[Module]:
 
 @functools.cache
 def _checkout() -> Sequence[Module]:
-    return _read(ROOT)
+    # A million nodes that stay: the collector would look at them again and again, which takes longer than
+    # to parse them.
+    collecting = gc.isenabled()
+    gc.disable()
+    modules = _read(ROOT)
+    for module in modules:
+        _ = module.nodes
+    gc.freeze()
+    if collecting:
+        gc.enable()
+    return modules
 
 
 def _read(root: Path) -> Sequence[Module]:

@@ -9,7 +9,7 @@ import pytest
 
 from toolkit.planning.drives import Drive, Pace, driven, fastest
 
-T = np.linspace(0.0, 40.0, 40001)
+T = np.linspace(0.0, 40.0, 8001)
 ENDS = (-2.0, 2.0)
 FREE = Pace(rate=1e6)
 COURSES = [

@@ -92,6 +92,19 @@ def test_what_rows_leave_open_is_evidence_for_neither() -> None:
         assert 0 < expected_log_evidence(run, both, *pair) < 0.5 * (5 / 3) ** 2
 
 
+def test_a_run_of_which_the_rows_mislead_a_fit_parts_nothing() -> None:
+    # Members are 5 patterns apart, and what comes is 3 further off the true one: it lies nearer to the other.
+    pattern = np.sin(np.arange(40.0))
+    run: Any = SimpleNamespace(t=np.arange(40.0), rows=40)
+    none, square = np.zeros((40, 0)), float(pattern @ pattern)
+    true, rival = (
+        Predicted(outputs={"F": mean}, spread={"F": none}, between={"F": 9 * pattern[:, None]})
+        for mean in (5 * pattern, 0 * pattern)
+    )
+    expected = expected_log_evidence(run, (member(1.0), member(1.0)), true, rival)
+    assert expected == pytest.approx(0.5 * (2**2 - 3**2) * square)
+
+
 def test_a_denser_run_has_its_rows_and_one_between_each_two(tmp_path: Path) -> None:
     run = problem(write_case(tmp_path)).runs[0]
     straight, smooth = denser(run, ["u"])

@@ -8,6 +8,7 @@ import pytest
 
 from tests.planning.class_factory import T, answer, found, problem, with_run, write_case
 from tests.planning.test_run_changes import steady_slide
+from toolkit.planning import next_run
 from toolkit.planning.drives import Drive, fastest
 from toolkit.planning.members import members_of
 from toolkit.planning.next_run import RunSearch, power_of
@@ -67,6 +68,17 @@ def test_nothing_is_searched_beyond_certainty(search: RunSearch) -> None:
     factors = again.factors(best)
     assert len(again.judged) < sum(map(len, factors))
     assert again._alternatives(best, 0).losses.tolist() == [-again.judged[best]]
+
+
+def test_of_runs_that_part_with_certainty_the_nearest_to_the_recording_counts(
+    search: RunSearch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Evidence grows with the pace, all of it beyond certainty: the most of it is at the fastest.
+    monkeypatch.setattr(
+        next_run, "expected_log_evidence", lambda run, *_: 1e3 * fastest(T, run.columns["u"]) ** 4
+    )
+    certain = RunSearch(problem=search.problem, members=search.members, limits=RunLimits())
+    assert certain.best() == Change(run="r0.csv")
 
 
 def test_every_factor_offers_something_and_a_sign_is_turned(tmp_path: Path) -> None:

@@ -48,6 +48,19 @@ def question(
     return Question.beside(protocol, tires=(earlier(measured),), demands=parsed, loads_N=loads)
 
 
+@pytest.fixture(autouse=True)
+def few_starts(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits are kept wherever the exchange starts: of more starts a plan is a little shorter at most."""
+    if "all_starts" not in request.fixturenames:
+        monkeypatch.setattr(protocol_search, "_STARTS", 2)
+
+
+@pytest.fixture
+def all_starts() -> None:
+    """Ask for the exchange from as many starts as a command has it."""
+
+
+@pytest.mark.usefixtures("all_starts")
 def test_the_uncertainties_of_the_protocol_are_reached_in_fewer_rows() -> None:
     asked = question("conicity", "plysteer", "slope_cornering", "peak")
     found = least_plan(asked, tread())
@@ -123,7 +136,6 @@ def test_a_demand_at_a_slip_angle_that_no_test_measures_is_refused() -> None:
     assert ", 5, " in str(error.value.expected)
 
 
-@pytest.mark.usefixtures("few_starts")
 def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
     asked = question("slope_cornering=4 %", loads=LOADS[2:3], measured=NEAR)
     free = least_plan(asked, tread(measured=NEAR))
@@ -137,13 +149,6 @@ def test_a_budget_of_energy_takes_gentler_slip_angles() -> None:
     assert impossible.excess > 0
 
 
-@pytest.fixture
-def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Limits are kept wherever the exchange starts: of more starts a plan is a little shorter at most."""
-    monkeypatch.setattr(protocol_search, "_STARTS", 2)
-
-
-@pytest.mark.usefixtures("few_starts")
 def test_a_limit_of_warmth_costs_pauses_and_they_count_in_the_time() -> None:
     asked = question("slope_cornering=3 %", loads=LOADS[2:3], measured=NEAR)
     free = least_plan(asked, tread(measured=NEAR))

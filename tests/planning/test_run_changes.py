@@ -196,7 +196,9 @@ def test_a_course_begins_within_the_limits_and_only_where_something_was_recorded
     assert run is not None
     assert run.columns["u"][0] == 0.9
     assert run.columns["u"].min() == pytest.approx(-2.0)
-    assert changed(posed, change, RunLimits(values={"u": (1.6, 3.0), "a": (-2.0, 2.0)})) is None
+    beyond = RunLimits(values={"u": (1.6, 3.0), "a": (-2.0, 2.0)})
+    for leaves in (change, Change(run="r0.csv", levels=(("u", "low"),))):
+        assert changed(posed, leaves, beyond) is None
     # An acceleration that never is zero leaves no course at all.
     assert changed(posed, change, RunLimits(values={"u": (1.0, 2.0), "a": (0.5, 1.0)})) is None
 

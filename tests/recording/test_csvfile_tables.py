@@ -58,7 +58,7 @@ def test_the_results_of_laboratories(tmp_path, encoding, separator, decimal):
 @pytest.mark.parametrize(("encoding", "separator", "decimal"), EVERY)
 def test_a_list_of_past_reports(tmp_path, encoding, separator, decimal):
     rows = [["report", "test"], ["Bericht Ü 1", "2018/tire A"]]
-    (report,) = read_reports(written(tmp_path / "r.csv", rows, encoding, separator, decimal))
+    (report,) = read_reports(written(tmp_path / "r.csv", rows, encoding, separator, decimal), [])
     assert (report.report, report.names) == ("Bericht Ü 1", {"2018/tire A"})
 
 
@@ -78,7 +78,7 @@ def test_a_file_of_the_field(tmp_path, encoding):
 def test_bytes_that_are_no_text_in_any_of_them_are_refused(tmp_path):
     path = tmp_path / "t.csv"
     path.write_bytes(b"SA [deg],FZ [N],FY [N]\n1,\x81,3\n")
-    for read in (read_table, read_laboratories, read_reports):
+    for read in (read_table, read_laboratories, lambda file: read_reports(file, [])):
         with pytest.raises(ToolkitError) as refusal:
             read(path)
         assert refusal.value.exit_code == 2

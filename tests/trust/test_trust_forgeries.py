@@ -31,10 +31,26 @@ def _laboratory() -> Iterator[None]:
     forget()
 
 
+WHOLE = pytest.mark.campaign(
+    "every forgery of a kind: a third of each kind, spread over its places, is tried in every run"
+)
+
+
+def spread(table: list[Forgery]) -> list[Forgery]:
+    """Return every third forgery of each kind, from its first on."""
+    kinds: dict[str, list[Forgery]] = {}
+    for forgery in table:
+        kinds.setdefault(forgery.kind, []).append(forgery)
+    return [forgery for alike in kinds.values() for forgery in alike[::3]]
+
+
+@pytest.mark.parametrize("part", [True, pytest.param(False, marks=WHOLE)], ids=["part", "whole"])
 @pytest.mark.parametrize("name", TABLES)
-def test_no_forgery_is_accepted(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_forgery_is_accepted(name: str, part: bool, capsys: pytest.CaptureFixture[str]) -> None:
     module, least = TABLES[name]
     table: list[Forgery] = list(module.forgeries())
+    assert len(table) >= least
+    table = spread(table) if part else table
     started = time.perf_counter()
     accepted = [f"{forgery.kind}: {forgery.what}" for forgery in table if forgery.accepted()]
     seconds = time.perf_counter() - started
@@ -43,7 +59,6 @@ def test_no_forgery_is_accepted(name: str, capsys: pytest.CaptureFixture[str]) -
         rows = ", ".join(f"{kind} {count}" for kind, count in sorted(counts.items()))
         print(f"\n{name}: {len(table)} forgeries in {seconds:.1f} s, {len(accepted)} accepted: {rows}")  # noqa: T201
     assert accepted == []
-    assert len(table) >= least
 
 
 def test_what_is_honest_is_accepted() -> None:

@@ -21,6 +21,7 @@ import pytest
 from playwright.sync_api import BrowserContext, sync_playwright
 
 from tests.cli.test_calibration_control import session
+from tests.workbench.kept_runner import kept_runner
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
@@ -178,6 +179,12 @@ def filled(home: Path) -> Path:
     (home / "audit").mkdir()
     (home / "audit" / "results.jsonl").write_text('{"generator": "toolkit"}\n')
     return home
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _jobs() -> Iterator[None]:
+    with kept_runner():
+        yield
 
 
 @pytest.fixture(scope="package")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.built_once import built_once
 from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_jobs_page import done
 from toolkit.errors import UnreadableError
@@ -58,10 +59,8 @@ def _case_files() -> list[tuple[str, bytes]]:
 CASE_FILES = _case_files()
 
 
-@pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A home with a case."""
-    lab = tmp_path_factory.mktemp("diagnosed") / "lab"
+def with_case(lab: Path) -> Path:
+    """Make a home with a case."""
     case = lab / "cases" / "cell"
     case.mkdir(parents=True)
     shutil.copytree(ROOT / "calibrations", lab / "calibrations")
@@ -71,13 +70,25 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def answered(home: Path) -> Path:
-    """The same home, its case diagnosed from its page."""
-    with serving(home) as bench:
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home with a case."""
+    return with_case(tmp_path_factory.mktemp("diagnosed") / "lab")
+
+
+def _diagnose(folder: Path) -> None:
+    with serving(with_case(folder / "lab")) as bench:
         assert f'data-case="{CASE}"' in bench.page("/diagnoses/list").body
         page = done(bench, bench.send(f"/case/{CASE}/diagnose", {}))
         assert 'data-state="findings"' in page.body, plain(page.body)
         assert f"/diagnosis/{ANSWER}" in page.body
+
+
+@pytest.fixture(scope="module")
+def answered(home: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same home, its case diagnosed from its page, for all who ask."""
+    shutil.copytree(
+        built_once(tmp_path_factory, "answered-page", _diagnose) / "lab", home, dirs_exist_ok=True
+    )
     return home
 
 

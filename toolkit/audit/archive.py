@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from toolkit.audit.archive_findings import Across, Lines
+from toolkit.audit.archive_findings import Across, Lines, unread_folder
 from toolkit.audit.cluster import run_on_cluster
 from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, DisagreeingSides, Grade
 from toolkit.audit.one_file import Auditor, unreadable
@@ -178,13 +178,21 @@ def _of_file(line: Mapping[str, Any]) -> list[Finding]:
 # The inventory of an archive: every regular file that may be a recording, and nothing else.
 
 
-def inventory(archive: Path) -> tuple[str, ...]:
-    """Return the paths of an archive's files, relative to it, with ``/``, sorted.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inventory:
+    """Paths of an archive's files, relative to it, with ``/``, sorted; ``unread`` tells of other folders."""
+
+    files: tuple[str, ...]
+    unread: tuple[Finding, ...]
+
+
+def inventory(archive: Path) -> Inventory:
+    """Return what an archive holds.
 
     Raises
     ------
     ConfigError
-        ``archive``: it is no folder, or a folder in it cannot be read
+        ``archive``: it is no folder, or cannot be read
     """
     if not archive.is_dir():
         raise ConfigError(
@@ -195,29 +203,42 @@ def inventory(archive: Path) -> tuple[str, ...]:
             next_step="check the path; a single file is for 'toolkit inspect'",
             rule="archive",
         )
-    return tuple(sorted(_walk(archive, "")))
-
-
-def _walk(folder: Path, prefix: str) -> Iterator[str]:
     try:
-        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+        entries = _entries(archive)
     except OSError as error:
         raise ConfigError(
-            "a folder of the archive cannot be read",
-            where=folder,
+            "the archive cannot be read",
+            where=archive,
             got=error.strerror or "an error",
             expected="a readable folder",
             next_step="check its permissions; nothing was audited",
             rule="archive",
         ) from error
-    for entry in entries:
-        if entry.is_symlink():
+    unread: list[Finding] = []
+    return Inventory(files=tuple(sorted(_walk(archive, "", entries, unread))), unread=tuple(unread))
+
+
+def _entries(folder: Path) -> list[tuple[str, bool]]:
+    """Return the names in a folder that may be or hold recordings, each with whether it is a folder."""
+    with os.scandir(folder) as entries:
+        kinds = [(e.name, e.is_dir(follow_symlinks=False), e.is_file(follow_symlinks=False)) for e in entries]
+    return sorted(
+        (name, is_dir) for name, is_dir, is_file in kinds if is_dir or (is_file and name != TEST_FILE)
+    )
+
+
+def _walk(folder: Path, prefix: str, entries: list[tuple[str, bool]], unread: list[Finding]) -> Iterator[str]:
+    """Yield the files; a folder below that cannot be read, or is gone by now, stops no other."""
+    for name, is_dir in entries:
+        if not is_dir:
+            yield prefix + name
             continue
-        name = prefix + entry.name
-        if entry.is_dir(follow_symlinks=False):
-            yield from _walk(folder / entry.name, name + "/")
-        elif entry.is_file(follow_symlinks=False) and entry.name != TEST_FILE:
-            yield name
+        try:
+            below = _entries(folder / name)
+        except OSError as error:
+            unread.append(unread_folder(prefix + name, error))
+        else:
+            yield from _walk(folder / name, f"{prefix}{name}/", below, unread)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,6 +261,10 @@ class ArchiveAudit:
     findings: tuple[Finding, ...]
     reused: int = field(compare=False)
 
+    def shown(self, test: str) -> str:
+        """Return a test's path as people read it: an archive that is one test has its folder's name."""
+        return self.archive.absolute().name if test == "." else test
+
     @property
     def clean(self) -> bool:
         """Whether every file is exact or rounding and nothing else asks for a person's attention."""
@@ -254,7 +279,7 @@ def audit_archive(
     workers: int = 1,
     scheduler: str | None = None,
     step: Callable[[str], None] = lambda _: None,
-    names: tuple[str, ...] | None = None,
+    names: Inventory | None = None,
     out: Path | None = None,
 ) -> ArchiveAudit:
     """Audit every file of an archive; the result does not depend on who reads it, nor on how many do.
@@ -285,7 +310,8 @@ def audit_archive(
             next_step="state the number of processes, such as the number of cores", rule="usage",
         )  # fmt: skip
     day = known_at or max([today(), *(registry.ledger(name).known_on() for name in registry.instruments())])
-    todo = inventory(archive) if names is None else names
+    names = names or inventory(archive)
+    todo = names.files
     digest = _hash(registry, day)
     limit = partial(_limit, archive)
     make: Callable[[], Callable[[str], Done]] = partial(_Worker, archive, registry, day)
@@ -307,7 +333,7 @@ def audit_archive(
         files = results.files(todo)
         files.decide(by_other_files(files))
         sums = _sums(out, files, results.digest(todo))
-        return _judged(archive, registry, day, files, sums, reused=len(reused))
+        return _judged(archive, registry, day, files, sums, names.unread, reused=len(reused))
 
 
 def _limit(archive: Path, name: str) -> float:
@@ -358,8 +384,9 @@ def _same(archive: Path, registry: Registry, day: dt.date, digest: str, version:
 
 
 def _judged(
-    archive: Path, registry: Registry, day: dt.date, files: Files, sums: Sums, *, reused: int
-) -> ArchiveAudit:
+    archive: Path, registry: Registry, day: dt.date, files: Files, sums: Sums,
+    unread: tuple[Finding, ...], *, reused: int,
+) -> ArchiveAudit:  # fmt: skip
     refused: list[RefusedRecord] = []
     heads: list[tuple[str, str]] = []
     troubles: list[Finding] = []
@@ -381,7 +408,7 @@ def _judged(
         tests=sums.tests,
         refused=tuple(refused),
         heads=tuple(heads),
-        findings=(*sums.findings, *_refusals(refused), *troubles, *sums.notes),
+        findings=(*sums.findings, *unread, *_refusals(refused), *troubles, *sums.notes),
         reused=reused,
     )
 

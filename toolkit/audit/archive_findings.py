@@ -39,6 +39,13 @@ Point = tuple[float, float, float, float, float]
 """SA [rad], then FY and MZ as the file has them and by the record in force [N, N·m], in SAE axes."""
 
 
+def unread_folder(where: str, error: OSError) -> Finding:
+    """Return what is said of a folder that cannot be read, or that is gone by the time that it is."""
+    reason = error.strerror or "an error"
+    message = f"the folder cannot be read, and nothing in it was looked at: {reason}"
+    return Finding(rule="unreadable-folder", where=where, message=message)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
     """One characteristic of one load: ``old`` by the files' own values, ``new`` by the record in force.

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.recording.model import Recording
 
-_DISPUTED = "cells-disagree"
+DISPUTED = "cells-disagree"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,10 +159,15 @@ def _strays(audit: ArchiveAudit) -> dict[str, str]:
     return found
 
 
+def disagreement(plain: Mapping[str, Any]) -> str:
+    """Return in words why nothing is computed of a disputed file."""
+    return statement(DisagreeingSides(**plain["sides"]), plain["variant"])
+
+
 def _refusal(plain: Mapping[str, Any], strays: Mapping[str, str]) -> str | None:
     """Return why a file must not be corrected by its cells, None where nothing speaks against it."""
     if disputed(plain):
-        return f"{_DISPUTED}: {statement(DisagreeingSides(**plain['sides']), plain['variant'])}"
+        return f"{DISPUTED}: {disagreement(plain)}"
     stray = strays.get(plain["path"])
     return None if stray is None else f"stray-file: corrected, {stray}"
 

@@ -15,11 +15,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from toolkit.audit.archive_findings import unread_folder
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
+from toolkit.calibration.registry.standing import overtaken
 from toolkit.declared import Entry, derived
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.files import check_keys, parse_json, real_path
+from toolkit.findings import Finding
 from toolkit.inputs import LIST_FILE, RECORDING_FILE, read_input, read_regular
 from toolkit.publication import ENTERING, PENDING, settle
 from toolkit.recording.csvfile import read_lines
@@ -67,7 +70,7 @@ class RestingReport:
         Fy and Mz stand in the files; any other is taken to rest on these.
         """
         if self.id is not None:
-            return bool(self.in_force) and set(self.calibrations) != self.in_force
+            return bool(self.in_force) and overtaken(self.calibrations, self.in_force)
         return self.not_clean > 0
 
 
@@ -83,8 +86,10 @@ class Linked:
         return [report.report for report in self.reports if test in report.tests]
 
 
-def read_reports(source: Path) -> tuple[RestingReport, ...]:
+def read_reports(source: Path, unread: list[Finding]) -> tuple[RestingReport, ...]:
     """Return the reports that a folder holds, or a CSV file names; no link is followed.
+
+    ``unread`` takes what is said of folders that cannot be read.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def read_reports(source: Path) -> tuple[RestingReport, ...]:
         there is no such folder or file, or the CSV file has other columns or a hash that is none
     """
     if source.is_dir():
-        return tuple(_of_folder(source))
+        return tuple(_of_folder(source, unread))
     return tuple(_of_csv(source))
 
 
@@ -122,7 +127,7 @@ def link(audit: ArchiveAudit, reports: tuple[RestingReport, ...]) -> Linked:
                 same_report.disputed += disputed(plain)
     names: dict[str, list[str]] = {}
     for test in tests:
-        names.setdefault(_words(_last(test, audit.archive)), []).append(test)
+        names.setdefault(_words(audit.shown(test).rpartition("/")[2]), []).append(test)
     for report in reports:
         for test in _by_name(report, names):
             report.tests.add(test)
@@ -160,10 +165,6 @@ def _by_name(past_report: RestingReport, names: Mapping[str, list[str]]) -> Iter
             yield from inside or tests
 
 
-def _last(test: str, archive: Path) -> str:
-    return archive.absolute().name if test == "." else test.rpartition("/")[2]
-
-
 def _words(text: str) -> str:
     return " ".join(re.findall(r"[^\W_]+", text.casefold()))
 
@@ -192,11 +193,18 @@ def _of_csv(source: Path) -> Iterator[RestingReport]:
     yield from past_reports.values()
 
 
-def _of_folder(folder: Path) -> Iterator[RestingReport]:
-    for place, folders, names in os.walk(folder):
+def _of_folder(folder: Path, unread: list[Finding]) -> Iterator[RestingReport]:
+    def tell(error: OSError) -> None:
+        unread.append(unread_folder(str(error.filename or folder), error))
+
+    for place, folders, names in os.walk(folder, onerror=tell):
         if {PENDING, ENTERING} & {*folders}:
-            settle(Path(place))
-            names = [path.name for path in Path(place).iterdir() if path.is_file()]
+            try:
+                settle(Path(place))
+                names = [path.name for path in Path(place).iterdir() if path.is_file()]
+            except OSError as error:
+                tell(error)
+                continue
         folders[:] = sorted(
             name for name in folders if not name.startswith(PASSING) and not (Path(place) / name).is_symlink()
         )
@@ -227,7 +235,9 @@ def _manifest(path: Path, folder: Path) -> tuple[RestingReport, set[str]] | None
         return None
     outputs = {output.get("name") for output in _dicts(manifest.get("outputs"))}
     past_report = RestingReport(
-        report=path.parent.relative_to(folder).as_posix(),
+        report=folder.absolute().name
+        if path.parent == folder
+        else path.parent.relative_to(folder).as_posix(),
         id=str(manifest.get("report")),
         hashes={
             entry["sha256"].lower() for entry in _dicts(manifest["inputs"]) if _is_sha(entry.get("sha256"))

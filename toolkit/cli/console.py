@@ -294,11 +294,11 @@ def progress(total: int | None, title: str, *, show: bool = True) -> Iterator[Ca
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.fields[text]}"),
+        TextColumn("{task.fields[text]}", markup=False),
         TimeElapsedColumn(),
         *([] if total is None else [TextColumn("left"), TimeRemainingColumn(compact=True)]),
         console=Console(stderr=True),
         transient=True,
     ) as bar:
         task = bar.add_task(title, total=total, text="")
-        yield lambda text: bar.update(task, advance=1, text=text)
+        yield lambda text: bar.update(task, advance=1, text=escaped(text, lines=False))

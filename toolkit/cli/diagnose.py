@@ -90,6 +90,7 @@ def _teller(*, show: bool) -> Any:
     import sys
 
     from toolkit.lab.progress_note import note_of
+    from toolkit.printable import escaped
 
     if (note := note_of("diagnosis", None)) is not None:
         return note.step
@@ -97,7 +98,7 @@ def _teller(*, show: bool) -> Any:
 
     def tell(step: str) -> None:
         if show and sys.stderr.isatty():
-            text = f"{time.monotonic() - started:5.0f} s  {step}" if step else ""
+            text = escaped(f"{time.monotonic() - started:5.0f} s  {step}", lines=False) if step else ""
             sys.stderr.write(f"\r\x1b[K{text[:110]}")
             sys.stderr.flush()
 

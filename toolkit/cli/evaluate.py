@@ -47,7 +47,7 @@ def command(
 
     Example: toolkit evaluate tire.tir grid.csv --axes SAE --out forces.csv
     """
-    from toolkit.lab.answers import findings_text
+    from toolkit.lab.answers import findings_text, one_line
     from toolkit.lab.tire_tests.evaluate import evaluate_grid, grid_rows, grid_text, grid_units, refuse_output
     from toolkit.publication import write_result
     from toolkit.tires.table import read_table
@@ -61,7 +61,7 @@ def command(
     text = grid_text(table, values)
     if out is not None:
         write_result(out, text)
-    printed = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {out}"
+    printed = text.rstrip("\n") if out is None else f"{len(table.cells)} rows written to {one_line(out)}"
     if findings:
         printed += f"\n\n{findings_text(findings)}"
     payload = {

@@ -37,6 +37,7 @@ def command(
     """
     from toolkit.audit.inspection import inspect_file
     from toolkit.errors import ToolkitError
+    from toolkit.lab.answers import one_line
     from toolkit.lab.home import registry_if_any
     from toolkit.lab.tire_tests.inspection_answer import inspection_payload, inspection_text, intervals_of
 
@@ -54,7 +55,7 @@ def command(
             # One bad file of many does not hide what the others hold.
             failed = True
             payloads.append({"file": path, "error": error.as_dict()})
-            texts.append(f"{path}\n  error: {error}")
+            texts.append(f"{one_line(path)}\n  error: {error}")
             continue
         intervals = intervals_of(inspection) if prove else ()
         payloads.append(inspection_payload(inspection, intervals))

@@ -101,6 +101,7 @@ def correct(
     from datetime import date
 
     from toolkit.diagnosis.answer.correction import correction_of, machine_of
+    from toolkit.lab.answers import one_line
     from toolkit.machine import load_machine
     from toolkit.machine.default import DEFAULT_MACHINE
     from toolkit.machine.definition import next_version
@@ -117,7 +118,7 @@ def correct(
     text, definition = next_version(machine, correction, out=out, diagnosed_with=fitted)
     write_result(out, text)
     payload = {"path": out} | _payload(definition)
-    output.answer(payload, f"{_text(definition)}\nwritten to {out}")
+    output.answer(payload, f"{_text(definition)}\nwritten to {one_line(out)}")
     return 0
 
 

@@ -86,6 +86,7 @@ def check(
 
     Example: toolkit template check report_templates/org.docx
     """
+    from toolkit.lab.answers import one_line
     from toolkit.report.kinds import check as check_template
     from toolkit.report.style import read_style, style_file
     from toolkit.report.word.package import open_package, read_template
@@ -105,7 +106,7 @@ def check(
         "findings": findings,
     }
     # Their number tells a template that another program has robbed of its controls.
-    output.answer(payload, text or f"{file}: no findings; {tags} different tags")
+    output.answer(payload, text or f"{one_line(file)}: no findings; {tags} different tags")
     return 1 if any(finding.level != "note" for finding in findings) else 0
 
 
@@ -231,6 +232,7 @@ def new(
     Example: toolkit template new report_templates/ours.docx --like summary --language fr
     """
     from toolkit.errors import OutputError
+    from toolkit.lab.answers import one_line
     from toolkit.lab.home import packaged_home
     from toolkit.publication import publication
     from toolkit.report.style import style_file, style_in_language
@@ -262,7 +264,7 @@ def new(
         toml = toml if language == SOURCE else style_in_language(toml, language)
         (stage / file.name).write_bytes(words)
         (stage / style.name).write_text(toml, encoding="utf-8")
-    output.answer({"template": file, "style": style}, f"{file}\n{style}")
+    output.answer({"template": file, "style": style}, f"{one_line(file)}\n{one_line(style)}")
     return 0
 
 

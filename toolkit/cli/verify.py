@@ -28,7 +28,7 @@ def command(
     """Tell of each document who issued it, when, over what, and whether it still holds; offline.
 
     Trusted are the certificates in trust/certificates and trust/laboratory.pem of the home, and those of
-    --trust. Exit code 0: all hold; 1: one is unsigned, of an unknown issuer, or withdrawn since; 2: one was
+    --trust. Exit code 0: all hold; 1: one is unsigned, of an unknown issuer, or holds no longer; 2: one was
     changed after it was sealed, or cannot be read.
 
     Example: toolkit verify certificate.pdf certificate.xml

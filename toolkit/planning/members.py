@@ -44,7 +44,8 @@ class Predicted:
     """What a member says of a run: ``outputs`` by name (n,), and what is open of them.
 
     ``spread`` by name (n, parameters): the change by one standard deviation of each independent parameter;
-    ``between`` by name (n, k): by what inputs may do between rows, whichever member is true.
+    ``between`` by name (n, k): by what inputs may do between rows, whichever member is true; first where they
+    go straight.
     """
 
     outputs: dict[str, Array]
@@ -213,7 +214,8 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
 
     The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
     identity). Each fit has taken what it does not explain for noise: the noise counts under which the two
-    are less apart. What rows leave open by either is open to both.
+    are less apart. What rows leave open by either is open to both. But a fit of the run takes simulations at
+    their rows for the truth: by what inputs that go straight between rows make of it, it is misled.
 
     Parameters
     ----------
@@ -234,7 +236,11 @@ def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, riv
     trace = float(np.sum(own**2) - np.sum(rivals * (rivals @ np.linalg.inv(inner))))
     trace -= float(np.sum(crossed * np.linalg.solve(inner, crossed)))
     logs = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(of_own)[1])
-    return 0.5 * (squares + trace + logs)
+    expected = 0.5 * (squares + trace + logs)
+    spread = _white(run, rival.spread, noise)
+    apart = gap - spread @ np.linalg.solve(np.eye(spread.shape[1]) + spread.T @ spread, spread.T @ gap)
+    misled = max((abs(float(apart @ w[:, 0])) for w in open_to_both if w.shape[1]), default=0.0) / _BETWEEN
+    return min(expected, 0.5 * float(gap @ apart) - misled) if misled else expected
 
 
 def _white(run: Run, values: dict[str, Array], noise: dict[str, Autoregression]) -> Array:

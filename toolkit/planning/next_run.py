@@ -30,7 +30,7 @@ _STEPS = (2, 3, 5, 9)  # levels of a course
 _ROWS = 3  # of a recording, for a move of a course
 _ROUNDS = 2
 _CERTAIN = 2 * VERDICT.close
-_WON = 1e-6  # of certainty: what lacks less is certain
+_ENOUGH = (1 - 1e-6) * _CERTAIN  # what lacks less is certain, and as good as any other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,7 +82,7 @@ class RunSearch:
 
     def _alternatives(self, change: Change, factor: int) -> Alternatives[Change]:
         alternatives = self.factors(change)[factor]
-        if self.judged.get(change, 0.0) > (1 - _WON) * _CERTAIN:
+        if self.judged.get(change, 0.0) >= _ENOUGH:
             alternatives = ()  # nothing can be won
         changes = (change, *alternatives)
         runs = [self._run(new) for new in changes if new not in self.judged]
@@ -115,8 +115,10 @@ class RunSearch:
             return -math.inf
         apart = [gain for _, _, gain in self._pairs(run, predictions)]
         # Beyond certainty nothing is won: a run that parts further pairs is better than one that parts one
-        # pair further.
-        return float(np.mean([_CERTAIN * (1 - math.exp(-max(gain, 0.0) / _CERTAIN)) for gain in apart]))
+        # pair further. Of runs that are as good, the first counts, which is the nearest to the recording:
+        # what is far from it the members' fits say nothing of.
+        worth = [_CERTAIN * (1 - math.exp(-max(gain, 0.0) / _CERTAIN)) for gain in apart]
+        return min(float(np.mean(worth)), _ENOUGH)
 
     def _predictions(self, run: Run) -> tuple[Predicted, ...] | None:
         predictions = tuple(

@@ -138,16 +138,7 @@ class Question:
         ConfigError
             ``plan-demand``
         """
-        at_angles = [demand for demand in self.demands if demand.SA_rad is not None]
-        measured = [bool(places.any()) for places in self._at_angles]
-        absent = [demand for demand, known in zip(at_angles, measured, strict=True) if not known]
-        if absent:
-            steps = ", ".join(f"{math.degrees(angle):.4g}" for angle in self.candidates_rad)
-            raise ConfigError(
-                "a demand is at a slip angle that no planned test measures", where="--u",
-                got=", ".join(demand.label for demand in absent), expected=f"one of {steps} deg",
-                next_step="name one of those; nothing was written", rule="plan-demand",
-            )  # fmt: skip
+        refuse_unmeasured(self.demands, self.candidates_rad)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -324,6 +315,32 @@ def least_plan(
             count = len(longer.design.slip_angles_rad)
             raise _too_short(minutes, longer.minutes, beside, count, "the fewest that leave no curve open")
     return met or cast("Judged", missed)
+
+
+def refuse_unmeasured(demands: Sequence[Demand], steps_rad: Sequence[float]) -> None:
+    """Refuse a demand at a slip angle that is none of the steps [rad] of a test.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-demand``, with the steps
+    """
+    absent = [
+        demand.label
+        for demand in demands
+        if demand.SA_rad is not None and not any(_same(step, demand.SA_rad) for step in steps_rad)
+    ]
+    if absent:
+        steps = ", ".join(f"{math.degrees(angle):.4g}" for angle in steps_rad)
+        raise ConfigError(
+            "a demand is at a slip angle that no planned test measures", where="--u",
+            got=", ".join(absent), expected=f"one of {steps} deg",
+            next_step="name one of those; nothing was written", rule="plan-demand",
+        )  # fmt: skip
+
+
+def _same(step_rad: float, angle_rad: float) -> bool:
+    return abs(step_rad - angle_rad) < _SAME_RAD
 
 
 def refuse_too_short(demands: Sequence[Demand], loads_N: Sequence[float], pace: Pace, minutes: float) -> None:

@@ -153,12 +153,12 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
     sources = dict(movable(problem, limits))
     for name, depth in sorted(_depths(sources).items(), key=lambda entry: entry[1]):
         column, source, root = run.columns[name], sources[name], _root(name, sources)
-        low, high = limits.values.get(name, reach(problem, name))
+        recorded = reach(problem, name)
+        low, high = limits.values.get(name, recorded)
+        if recorded[1] < low or recorded[0] > high:
+            return None  # the members are known nowhere there
         if root in drives:
             if source is None:
-                recorded = reach(problem, name)
-                if recorded[1] < low or recorded[0] > high:
-                    return None  # the members are known nowhere there
                 ends = _ends(low, high, sizes.get(name, 1.0), levels.get(name))
                 pace = _pace(problem, name, sources, limits).told_by_rows(
                     float(np.median(np.diff(run.t))), _BETWEEN_ROWS * (high - low)

@@ -123,7 +123,7 @@ def least_sweeps(
     ConfigError
         ``plan-demand``: a demand without a size; the machine states nothing of sweeps
     """
-    sweeping = _checked(demand, machine)
+    sweeping = sweeping_for(demand, machine)
     cases = [
         _Case(earlier=earlier, load_N=load, length_m=length)
         for earlier, load in itertools.product(tires, loads_N)
@@ -137,12 +137,17 @@ def least_sweeps(
         tell(f"sweeps over {steering.cycle_m / 2:.0f} m")
         basis = [_predicted(case, steering, sweeping) for case in cases]
         for chosen in _speed_sets(speeds, sweeping):
-            for cycles in itertools.product(_CYCLES, repeat=len(chosen)):
-                design = SweepDesign(
+            designs = [
+                SweepDesign(
                     steering=steering, speeds_m_s=chosen, cycles=cycles, loads_N=tuple(sorted(loads_N))
                 )
+                for cycles in itertools.product(_CYCLES, repeat=len(chosen))
+            ]
+            # The most cycles first. Noise falls with them: where they do not serve, no fewer do.
+            for design in (designs[-1], *designs[:-1]):
                 seconds = design.seconds(between_files_s=between_files_s, to_load_s=to_load_s)
-                if best is not None and best.feasible and seconds >= best.seconds:
+                longer = best is not None and best.feasible and seconds >= best.seconds
+                if longer and design is not designs[-1]:
                     continue
                 judged = SweepChoice(
                     design=design, seconds=seconds,
@@ -152,6 +157,8 @@ def least_sweeps(
                 )  # fmt: skip
                 if best is None or _key(judged) < _key(best):
                     best = judged
+                if design is designs[-1] and not judged.feasible:
+                    break
     if best is None:
         raise ConfigError(
             "no sweep stays within what the machine can steer", where=f"machine {machine.name}, [sweeping]",
@@ -170,7 +177,14 @@ def _key(choice: SweepChoice) -> tuple[float, float]:
     return max(choice.worst, 1.0), choice.seconds
 
 
-def _checked(demand: Demand, machine: Machine) -> Sweeping:
+def sweeping_for(demand: Demand, machine: Machine) -> Sweeping:
+    """Return what a machine states of sweeps, for a demand of a relaxation length.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-demand``: the machine states nothing, the demand no size
+    """
     if machine.sweeping is None:
         raise ConfigError(
             "a relaxation length cannot be planned", where=f"machine {machine.name}",

@@ -223,7 +223,7 @@ def nearest_test_toml(path: Path) -> Path | None:
     start = Path(os.path.abspath(path))  # noqa: PTH100  links are not followed
     for folder in (start, *start.parents):
         candidate = folder / TEST_FILE
-        if candidate.is_file():
+        if is_regular(candidate):
             return candidate
     return None
 

@@ -15,7 +15,7 @@ from tests.calibration.control_factory import enter, write_session
 from tests.calibration.registry.test_candidate_legacy import GOOD
 from tests.trust.forgeries.laboratory import KEYS, event_of, laboratory
 from toolkit.calibration.registry import approval, candidate, clock, ledger, life
-from toolkit.calibration.registry.approval import approve, withdraw
+from toolkit.calibration.registry.approval import approve, discard, withdraw
 from toolkit.calibration.registry.candidate import import_legacy
 from toolkit.calibration.registry.clock import clock_state
 from toolkit.calibration.registry.ledger import HEAD, LEDGER, START, head_bytes, next_line
@@ -24,6 +24,7 @@ from toolkit.calibration.registry.standing import standing
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RegistryError
+from toolkit.lab.signatures.issuing import issue
 
 SESSION = dt.date(2025, 3, 10)
 TODAY = clock.today()
@@ -164,6 +165,77 @@ def test_an_approval_of_a_fast_clock_is_withdrawn_on_the_day_that_it_is_and_leav
     assert {row.id for row in verify_registry(entered) if not row.ok} == {LEDGER}
     enter(entered, tmp_path / "s2", SESSION + dt.timedelta(days=1))
     assert approve(entered, "cell-r2", in_force_from=SESSION, checked_by="B", reason="late").done
+
+
+def test_a_candidate_of_a_fast_clock_is_discarded_and_the_ledger_goes_on(
+    entered: Registry, tmp_path: Path
+) -> None:
+    late = of_a_fast_clock(entered)
+
+    def enter_another(folder: str) -> None:
+        enter(entered, tmp_path / folder, SESSION + dt.timedelta(days=1))
+
+    error = refused(entered, lambda: enter_another("s2"))
+    assert error.expected == f"a time from {late} on"
+    assert "discard the candidate that it is about" in str(error.next_step)
+    discard(entered, "cell-r1", reason="its line is of a fast clock", by="B")
+    assert entered.status("cell-r1").state == "discarded"
+    enter_another("s3")
+    assert approve(entered, "cell-r2", in_force_from=SESSION, checked_by="B", reason="late").done
+    assert entered.ledger("cell").damage is None
+    assert entered.id_in_force("cell", on=TODAY) == "cell-r2"
+
+
+@pytest.mark.parametrize("end", ["discard", "withdraw"])
+def test_a_candidate_whose_session_is_of_a_fast_clock_can_be_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    registry = Registry(tmp_path / "cal")
+    late = dt.datetime.now(tz=dt.UTC) + dt.timedelta(days=100)
+    with monkeypatch.context() as fast:
+        fast.setattr(candidate, "now", lambda: late.strftime("%Y-%m-%dT%H:%M:%SZ"))
+        fast.setattr(candidate, "check_begun", lambda *_words: None)
+        enter(registry, tmp_path / "s", late.date())
+    # Its session has not begun: no day of a decision lies after it yet.
+    error = refused(
+        registry, lambda: approve(registry, "cell-r1", in_force_from=TODAY, checked_by="B", reason="x")
+    )
+    assert "before the session" in error.what
+    if end == "discard":
+        discard(registry, "cell-r1", reason="fast clock", by="B")
+    else:
+        withdraw(registry, "cell-r1", on=TODAY, reason="fast clock", by="B")
+    assert registry.status("cell-r1").ended
+    enter(registry, tmp_path / "s2", SESSION)
+    assert approve(registry, "cell-r2", in_force_from=SESSION, checked_by="B", reason="late").done
+    assert [row.id for row in verify_registry(registry) if not row.ok] == [LEDGER]
+
+
+def test_a_document_of_a_fast_clock_keeps_nothing_out(entered: Registry, tmp_path: Path) -> None:
+    assert approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B", reason="late").done
+    document = {"name": "report T", "content": "c" * 64, "tested": SESSION.isoformat()}
+
+    def release() -> None:
+        issue(entered, "cell-r1", document, decided=entered.ledger("cell").decided)
+
+    release()
+    late = of_a_fast_clock(entered)
+    release()
+    enter(entered, tmp_path / "s2", SESSION + dt.timedelta(days=1))
+    assert approve(entered, "cell-r2", in_force_from=SESSION, checked_by="B", reason="late").done
+    assert entered.ledger("cell").damage is None
+    assert entered.id_in_force("cell", on=TODAY) == "cell-r2"
+    assert late in str(entered.ledger("cell").doubt)
+
+
+def test_a_clock_that_was_set_back_writes_nothing_after_a_document_either(
+    entered: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    issue(entered, "cell-r1", {"name": "report T"}, decided=entered.ledger("cell").decided)
+    last = entered.ledger("cell").entries[-1].time
+    before = (clock.moment(last) - dt.timedelta(seconds=1)).strftime("%Y-%m-%dT%H:%M:%SZ")
+    monkeypatch.setattr(approval, "now", lambda: before)
+    refused(entered, lambda: approve(entered, "cell-r1", in_force_from=SESSION, checked_by="B"))
 
 
 def test_a_clock_that_was_set_back_brings_no_withdrawn_record_back(

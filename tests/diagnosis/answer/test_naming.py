@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from toolkit.diagnosis.answer import naming
-from toolkit.diagnosis.answer.next_measurements import outsized
+from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
 
@@ -32,7 +32,7 @@ def search(*, explained, unexplained, before, after, zero=0.0):
 def plain(monkeypatch):
     """Leave the other rules out: no parameter far off, no law of a cell, nothing within the accuracy."""
     monkeypatch.setattr(naming, "implausible", lambda _: ())
-    monkeypatch.setattr(naming, "outsized", lambda _: False)
+    monkeypatch.setattr(naming, "is_outsized", lambda *_: False)
     monkeypatch.setattr(naming, "_is_within_accuracy", lambda _: False)
     monkeypatch.setattr(naming, "held_out_errors", lambda of, **_: of.errors)
 
@@ -56,10 +56,8 @@ def test_steps_of_a_search_that_was_cut_short_are_shown_beside_a_rest_that_it_ha
     assert naming.mostly_unknown(found) is unknown
 
 
-@pytest.mark.parametrize(
-    ("unit", "is_outsized"), [("N", True), ("mV/V", True), ("T", False), ("degC", False)]
-)
-def test_a_loop_as_wide_as_no_cell_has_speaks_against_a_cell_and_not_against_an_iron(unit, is_outsized):
+@pytest.mark.parametrize(("unit", "outsized"), [("N", True), ("mV/V", True), ("T", False), ("degC", False)])
+def test_a_loop_as_wide_as_no_cell_has_speaks_against_a_cell_and_not_against_an_iron(unit, outsized):
     effect = effects()["hysteresis"]
     values = {each.name: 1.0 for each in effect.parameters}
     active = AppliedEffect(effect=effect, channel="B", values=values | {"width": 1.0, "gain": 1.0})
@@ -69,4 +67,4 @@ def test_a_loop_as_wide_as_no_cell_has_speaks_against_a_cell_and_not_against_an_
         model=Of(outputs=(Of(name="B", unit=unit),), capability=Of(motion=None)),
         case=Of(channels=(Of(name="B", unit=unit),), unit=lambda _: unit, parameters=()),
     )  # fmt: skip
-    assert outsized(Of(problem=problem, steps=(Of(active=active),))) is is_outsized
+    assert is_outsized(problem, active) is outsized

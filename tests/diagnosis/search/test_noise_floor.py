@@ -168,3 +168,34 @@ def test_a_rest_that_wanders_as_long_as_the_recording_is_not_known_to_be_noise(t
     assert (LONG in {each.reason for each in hidden(case)}) is (verdict == "unknown")
     answer = diagnose(case, None).diagnosis
     assert (answer.verdict, answer.effects) == (verdict, ())
+
+
+COASTING = case_text(
+    "ode",
+    title="A car that coasts",
+    parameters={"drag": (0.05, "1/s", 0.02)},
+    outputs={"v": "m/s"},
+    runs=3,
+    states=["v"],
+)
+SLOWED = """
+def initial(p):
+    return [12.0]
+def rhs(t, x, u, p):
+    return [-p["drag"] * x[0]]
+def outputs(x, u, p):
+    return {"v": x[0]}
+"""
+
+
+@pytest.mark.parametrize(("scatter", "reasons"), [(0.06, [LONG]), (0.0, [])])
+def test_an_arc_as_long_as_every_run_is_not_known_to_be_noise(tmp_path, scatter, reasons):
+    """Coast-downs under another wind each time leave arcs of both signs, far above the sensor."""
+    t = np.arange(200) * 0.1
+    frames = {}
+    for run, wind in enumerate((-1, 0.2, 1)):
+        rng = np.random.default_rng(run)
+        v = 12 * np.exp(-0.05 * (1 + scatter * wind) * t) + rng.normal(0, 0.01, t.size)
+        frames[f"r{run}__csv"] = pd.DataFrame({"t": t, "v": v})
+    case = read_case(write_case(tmp_path, COASTING, simulator=SLOWED, **frames))
+    assert [found.reason for found in hidden(case)] == reasons

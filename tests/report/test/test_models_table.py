@@ -92,12 +92,27 @@ def read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resolve, "resolve_test", lambda _test, *_basis, **_options: made)
 
 
+def test_the_default_template_prints_them() -> None:
+    opened, made = read_template(FOLDER / "org.docx"), content(COMPARISON)
+    shown = survey(opened, made).figures
+    assert {"models_fy", "models_mz"} <= set(shown)
+    picture = draw(made.plots["models_fy"])  # one for all: what each shows is its own tests' affair
+    filled = fill(opened, made, dict.fromkeys(shown, picture), allow_missing=True)
+    tags = {one.tag for one in filled.manifest}
+    # The time is printed all the same.
+    assert {f"tk:table.models.{name}" for name in ("model", "FY_parameters", "seconds")} <= tags
+
+
 @office_needed
-def test_the_default_template_prints_them_and_its_hash_does_not_know_the_clock(
+def test_a_report_has_them_and_its_hash_does_not_know_the_clock(
     tmp_path: Path, read: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    template = tmp_path / "org.docx"
-    template.write_bytes((FOLDER / "org.docx").read_bytes())
+    columns = ("model", "FY_parameters", "seconds")
+    required = p("{{tk:report.id}}, {{tk:test.name}}, {{tk:calibration.id}}")
+    body = (
+        required + p("{{tk:table.models}}") + tbl([*columns], [f"{{{{tk:row.{name}}}}}" for name in columns])
+    )
+    template = make(tmp_path, body + p("{{tk:figure.models_fy}}") + p("{{tk:figure.models_mz}}"))
     models = ["magic_formula", "brush"]
     assert command(
         [Path("any")], template=template, out=tmp_path / "out", models=models, allow_missing=True, json=True
@@ -108,7 +123,6 @@ def test_the_default_template_prints_them_and_its_hash_does_not_know_the_clock(
     # Six parameters a load, as the fit of each has them.
     assert ("tk:table.models.FY_parameters", str(6 * len(LOADS_N))) in cells
     assert {"tk:figure.models_fy", "tk:figure.models_mz"} <= {one["tag"] for one in told["figures"]}
-    # The time is printed all the same.
     assert any(tag == "tk:table.models.seconds" for tag, _ in cells)
     assert told["content_sha256"] == again(template, models)
 

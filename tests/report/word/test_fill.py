@@ -476,3 +476,30 @@ def test_an_uncertainty_that_is_not_known_leaves_the_value_its_format(tmp_path: 
     )
     made = dataclasses.replace(made, tables={**made.tables, "fits": dataclasses.replace(table, rows=rows)})
     assert filled(tmp_path, body, made).cells[0] == ("11.250", "n/a")
+
+
+@pytest.mark.parametrize(
+    ("tag", "plain"), [("tk:tire.size", True), ("tk:figure.gough", False), ("tk:tire.series", False)]
+)
+@pytest.mark.parametrize("level", ["run", "paragraph"])
+def test_a_control_of_plain_text_around_a_literal_holds_plain_text_alone(
+    tmp_path: Path, tag: str, plain: bool, level: str
+) -> None:
+    """Word finds a document damaged in which such a control holds a picture, and drops its line breaks."""
+    made = content()
+    series = Value(kind="text", value="worn\nand cold")
+    made = dataclasses.replace(made, values=made.values | {"tire.series": series})
+    literal = f"{{{{{tag}}}}}"
+    body = (
+        p("a ", sdt("own", run(literal), "<w:text/>"))
+        if level == "run"
+        else sdt("own", p(literal), "<w:text/>")
+    )
+    tree = root(filled(tmp_path, body, made))
+    assert len(list(tree.iter(f"{{{W}}}text"))) == int(plain)
+
+
+def test_a_control_of_plain_text_that_is_tagged_as_a_figure_becomes_one_of_rich_text(tmp_path: Path) -> None:
+    tree = root(filled(tmp_path, sdt("tk:figure.gough", p("here"), "<w:text/>")))
+    assert list(tree.iter(f"{{{W}}}drawing"))
+    assert not list(tree.iter(f"{{{W}}}text"))

@@ -153,6 +153,7 @@ _FORMS = LineForms()
 _DAMAGE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 _DECIDING = frozenset(("approved", "withdrawn", "discarded"))
 BRINGING = ("entered", "enrolled")  # events with files of their own
+ENDING = ("withdrawn", "discarded")  # events that end a record, and can always be entered
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,7 +172,8 @@ class Entry:
     ``note`` where the entry is dated back.
     ``discarded``: ``known_on``, ``by``, ``reason``: the end of a candidate that was never approved.
     ``issued``: ``by``, ``document``: what left the laboratory, its ``name``, the hash ``content`` of what it
-    says, and the hashes of its files (`toolkit.lab.signatures.issuing`).
+    says, the hashes of its files, and of a report the day of its test, ``tested`` (older lines have none)
+    (`toolkit.lab.signatures.issuing`).
     ``enrolled``: ``by``, ``reason``, ``file`` (the hash of the people's file), ``heads``: count and last hash
     of every ledger until then, nothing of one that was damaged; older lines but the first have none. Lines
     before the first one need no signature.

@@ -17,7 +17,7 @@ from typing import Any
 
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.clock import begun, check_begun, moment, untimely
-from toolkit.calibration.registry.ledger import Entry, Ledger
+from toolkit.calibration.registry.ledger import ENDING, Entry, Ledger
 from toolkit.calibration.registry.status import parse_interval, status_of
 from toolkit.errors import RegistryError
 from toolkit.trust.people import name_key
@@ -122,17 +122,17 @@ def misplaced(ledger: Ledger, instrument: str) -> str | None:
 def disorder(ledger: Ledger) -> str | None:
     """Say which line's time lies before that of the one before it; None where none does.
 
-    A withdrawal may: it can always be entered, after a line of a clock that was fast too, and the lines after
-    it follow its time.
+    A line that ends a record may: it can always be entered, after a line of a clock that was fast too, and
+    the lines after it follow its time. That a document was issued decides nothing, and its time bounds none.
     """
     last: Entry | None = None
     for entry in ledger.entries:
-        if last is not None and entry.event != "withdrawn" and _earlier(entry.time, last.time):
+        if last is not None and entry.event not in ENDING and _earlier(entry.time, last.time):
             return (
                 f"line {entry.seq} was entered at {entry.time}, before line {last.seq} at {last.time}: "
                 "a clock was set back"
             )
-        last = entry
+        last = last if entry.event == "issued" else entry
     return None
 
 
@@ -311,7 +311,11 @@ def _untimely(
             f"{entry.event} at {entry.time} by a decision of {day.isoformat()}", "a day that had begun",
         )  # fmt: skip
     # A legacy record has no session: its date is that of the source that names its coefficients.
-    if record is not None and record.kind == "fit" and day < date.fromisoformat(record.date):
+    if record is None or record.kind != "fit":
+        return
+    session = date.fromisoformat(record.date)
+    # A session whose day had not begun when its record was ended is of a fast clock: no day follows it.
+    if day < session and (entry.event not in ENDING or begun(session, moment(entry.time))):
         yield untimely(
             "a decision lies before the session that it is about", entry.id,
             f"decided on {day.isoformat()}, session of {record.date}", f"a day from {record.date} on",

@@ -22,7 +22,7 @@ from toolkit.calibration.registry.status import RecordStatus, parse_interval
 from toolkit.errors import RecordError, ToolkitError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from toolkit.calibration.records.record import CalibrationRecord
     from toolkit.calibration.registry.registry import Registry
@@ -168,7 +168,7 @@ def unapproved(registry: Registry, record: CalibrationRecord, status: RecordStat
     """Return why a record is not approved: its gates that fail, or that nobody has approved it yet."""
     if status.in_force_from is not None:
         return ()
-    state = "a candidate that nobody has approved" if status.state == "candidate" else status.state
+    state = _UNAPPROVED if status.state == "candidate" else status.state
     try:
         failed = failed_gates(registry, record)
     except ToolkitError as error:
@@ -198,6 +198,7 @@ def failed_gates(
     return judge_stored(registry, record, registry.ledger(record.instrument), machine=machine).failed
 
 
+_UNAPPROVED = "a candidate that nobody has approved"
 _OF_THE_LEDGER = "of the ledger "
 _VERIFY = "see 'toolkit calibration verify'"
 
@@ -230,15 +231,8 @@ def _by_day(
 ) -> list[Reason]:
     """Return what the test's day says against an approved record."""
     reasons: list[Reason] = []
-    winner = registry.id_in_force(record.instrument, on=on, known_at=known_on)
-    if status.in_force_from is not None and on < status.in_force_from:
-        text = f"not in force until {status.in_force_from.isoformat()}"
-        reasons.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known_on)))
-    elif winner not in (None, record.id):
-        begin = registry.status(str(winner), known_at=known_on).in_force_from
-        text = f"superseded by {winner}" + (f", in force from {begin.isoformat()}" if begin else "")
-        if begin is not None and status.in_force_from is not None and begin < status.in_force_from:
-            text = f"approved only after {known_on.isoformat()}: {winner} was in force then"
+    text = _passed_over(registry, record.instrument, status, on, known_on)
+    if text is not None:
         reasons.append(Reason(text=text, next_step=_other(registry, record.instrument, on, known_on)))
     due = due_date(record, status)
     if due is not None and on > due:
@@ -246,6 +240,53 @@ def _by_day(
         step = "calibrate the instrument, or approve the record again with a longer --recall and the reason"
         reasons.append(Reason(text=text, next_step=step))
     return reasons
+
+
+def _passed_over(
+    registry: Registry, instrument: str, status: RecordStatus, on: date, known_on: date
+) -> str | None:
+    """Return why another record, or none yet, is in force on a day; None where this one is."""
+    winner = registry.id_in_force(instrument, on=on, known_at=known_on)
+    if status.in_force_from is not None and on < status.in_force_from:
+        return f"not in force until {status.in_force_from.isoformat()}"
+    if winner in (None, status.id):
+        return None
+    begin = registry.status(str(winner), known_at=known_on).in_force_from
+    if begin is not None and status.in_force_from is not None and begin < status.in_force_from:
+        return f"approved only after {known_on.isoformat()}: {winner} was in force then"
+    return f"superseded by {winner}" + (f", in force from {begin.isoformat()}" if begin else "")
+
+
+def overtaken(used: Collection[str], in_force: Collection[str]) -> bool:
+    """Tell whether a document rests on other records than those in force on the days of its tests.
+
+    >>> overtaken(["m15-r1"], ["m15-r2"]), overtaken(["m15-r2"], ["m15-r2"])
+    (True, False)
+    """
+    return {*used} != {*in_force}
+
+
+def out_of_force(registry: Registry, instrument: str, record_id: str, *, on: date) -> str | None:
+    """Return why a record is not the one in force on a test's day, as known today; None where it is.
+
+    A recall interval voids nothing: what it says is asked before a number is made (`standing`).
+
+    Raises
+    ------
+    RegistryError
+        the ledger is damaged, or does not know the record
+    """
+    known_on = registry.ledger(instrument).known_on()
+    winner = registry.id_in_force(instrument, on=on, known_at=known_on)
+    if not overtaken((record_id,), () if winner is None else (winner,)):
+        return None
+    status = registry.status(record_id, known_at=known_on)
+    void = withdrawal(status, on)
+    if void:
+        return void[0].text
+    if status.in_force_from is None:
+        return _UNAPPROVED
+    return _passed_over(registry, instrument, status, on, known_on) or "no record is in force then"
 
 
 def due_date(record: CalibrationRecord, status: RecordStatus) -> date | None:

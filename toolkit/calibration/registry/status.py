@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Literal
 
-from toolkit.calibration.registry.ledger import Entry, Ledger
+from toolkit.calibration.registry.ledger import ENDING, Entry, Ledger
 from toolkit.errors import RegistryError
 
 State = Literal["candidate", "approved", "withdrawn", "discarded"]
-ENDED: tuple[State, ...] = ("withdrawn", "discarded")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +45,7 @@ class RecordStatus:
     @property
     def ended(self) -> bool:
         """Whether the record was withdrawn or discarded."""
-        return self.state in ENDED
+        return self.state in ENDING
 
 
 def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> RecordStatus:
@@ -59,7 +58,7 @@ def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> Recor
     entered = next(entry for entry in entries if entry.event == "entered")
     approvals = [entry for entry in entries if entry.event == "approved"]
     end = next(
-        (e for e in entries if e.event in ENDED and e.known_on is not None and e.known_on <= known_at), None
+        (e for e in entries if e.event in ENDING and e.known_on is not None and e.known_on <= known_at), None
     )
     since = min((e.since for e in approvals if e.since is not None), default=None)
     void_from = None

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.calibration.records.record import canonical
-from toolkit.calibration.registry.clock import check_after
-from toolkit.calibration.registry.ledger import HEAD, LEDGER, Ledger, head_bytes, next_line
+from toolkit.calibration.registry.clock import ahead, check_after
+from toolkit.calibration.registry.ledger import ENDING, HEAD, LEDGER, Entry, Ledger, head_bytes, next_line
 from toolkit.calibration.registry.lock import content, writing
 from toolkit.calibration.registry.settled import JOURNAL, before, damaged, is_part, state_of
 from toolkit.calibration.registry.signatures import signed_event, timed_event
@@ -37,7 +37,10 @@ from toolkit.trust.signing import Signing
 
 _DECIDED = ".pending.json.part"
 _NAMES = ("by", "approved_by", "recall")
-_WAY_ON = "; where the last entry was made by a fast clock, withdraw the record that it is about"
+_WAYS_ON = {
+    "entered": "discard the candidate that it is about, and enter its data again with --again",
+    "approved": "withdraw the record that it is about",
+}
 # A folder that another writer removes while this one waits for its lock is made again.
 _ATTEMPTS = 100
 
@@ -95,9 +98,12 @@ def commit(
         # A line stands for ever, and every document of its record prints what it says.
         check_entries(change.event, where=change.event["id"], names=_NAMES)
         event = timed_event(change.event, ledger, signing)
-        last = ledger.entries[-1].time if ledger.entries else None
-        if event["event"] != "withdrawn":
-            check_after(last, event["time"], folder / LEDGER, _WAY_ON)
+        last = _bound(ledger)
+        if last is not None and event["event"] not in ENDING:
+            way_on = _WAYS_ON.get(last.event)
+            if way_on is not None:
+                way_on = f"; where {last.event} {last.id} is of a fast clock, {way_on}"
+            check_after(last.time, event["time"], folder / LEDGER, way_on or "")
         if signing is not None:
             event = signed_event(event, ledger, signing, action=change.action, file=_text_of(change))
         line, digest = next_line(len(ledger.entries) + 1, ledger.head, event)
@@ -125,6 +131,15 @@ def commit(
         with contextlib.suppress(OSError):  # the next writer removes it
             (folder / _DECIDED).unlink()
         return True
+
+
+def _bound(ledger: Ledger) -> Entry | None:
+    """Return the line before whose time no line is entered: the last one.
+
+    A document that was issued by a fast clock keeps nothing out: it decided nothing.
+    """
+    lines = (entry for entry in reversed(ledger.entries) if entry.event != "issued" or not ahead(entry.time))
+    return next(lines, None)
 
 
 def _text_of(change: Change) -> str | None:

@@ -9,10 +9,11 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import cut_short
 from toolkit.diagnosis.answer.held_out_errors import held_out_errors, judged_noise
-from toolkit.diagnosis.answer.next_measurements import implausible, outsized
+from toolkit.diagnosis.answer.next_measurements import implausible
 from toolkit.diagnosis.fit.sensor_noise import spread
 from toolkit.diagnosis.fit.structure import RUNS
 from toolkit.diagnosis.policy import SCREENING, VERDICT
+from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.search import Search
 
 if TYPE_CHECKING:
@@ -41,7 +42,9 @@ def mostly_unknown(search: Search) -> bool:
     if not search.structure or (search.steps and cut_short(search.skipped)):
         return False
     # A rest that no test tells from anything (its gain is none) is no evidence that a size imitates it.
-    if outsized(search) and any(structure.gain > 0 for structure in search.structure):
+    if any(structure.gain > 0 for structure in search.structure) and any(
+        is_outsized(search.problem, step.active) for step in search.steps
+    ):
         return True
     if any(removed > VERDICT.nearly * above for removed, above in shown) or _takes_more_than_is_left(search):
         return False

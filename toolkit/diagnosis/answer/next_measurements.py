@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.unexplained import Line
 
-_OF_CELLS = ("force", "moment", "pressure", "bridge_ratio", "voltage", "count", "ratio")
-"""Dimensions of what strain gauges read; of a unit that is not known it may be one."""
-
 _OF_LOADS = ("force", "moment", "mass", "bridge_ratio")
 """Dimensions of what known loads are applied to: a voltage or a count may be of anything."""
 
@@ -86,25 +83,6 @@ def implausible(search: Search) -> tuple[str, ...]:
         for parameter, p in values
         if parameter.sd is not None and abs(p - parameter.value) > PRIORS.far * parameter.sd
     )
-
-
-def outsized(search: Search) -> bool:
-    """Tell whether a law of a cell stands with a size that no cell has: something else bends the answer.
-
-    Asked of what acts by the value that a cell carries, on what a cell can read: an iron's loop is no cell's.
-    A zero may be any, where nobody tared, and a factor that was found as units are, as far from one.
-    """
-    for active in (step.active for step in search.steps):
-        by_value = active.effect.on_channel is not None and active.effect.on_channel.by_value
-        if active.effect.stage != "load_cells" or not by_value or active.effect.needs_signal:
-            continue
-        view = CaseView(search.problem, active.channel, active.source)
-        text = view.unit()
-        if (text is None or unit(text).dimension in _OF_CELLS) and active.is_unusual(
-            view, log_density=PRIORS.within**2 / 2
-        ):
-            return True
-    return False
 
 
 def next_measurements(

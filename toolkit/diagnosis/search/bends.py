@@ -16,6 +16,7 @@ import numpy as np
 from toolkit.diagnosis.policy import PRIORS, STEP
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.errors import FitError
+from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
@@ -30,7 +31,7 @@ def only_bends(problem: Problem, fit: Fit) -> bool:
     """
     return (
         any(at_bound(applied) for applied in fit.active)
-        or any(_is_outsized(problem, applied) for applied in fit.active)
+        or any(_is_beyond_sensors(problem, applied) for applied in fit.active)
         or any(_is_undone(problem, fit, *pair) for pair in _curves(fit))
     )
 
@@ -47,7 +48,26 @@ def at_bound(effect: AppliedEffect) -> bool:
     return False
 
 
-def _is_outsized(problem: Problem, applied: AppliedEffect) -> bool:
+_OF_CELLS = ("force", "moment", "pressure", "bridge_ratio", "voltage", "count", "ratio")
+"""Dimensions of what strain gauges read; of a unit that is not known it may be one."""
+
+
+def is_outsized(problem: Problem, applied: AppliedEffect) -> bool:
+    """Tell whether a law of a cell has a size that no cell has: something else bends the answer.
+
+    Asked of what acts by the value that a cell carries, on what a cell can read: an iron's loop is no cell's.
+    A zero may be any, where nobody tared, and a factor that was found as units are, as far from one.
+    """
+    by_value = applied.effect.on_channel is not None and applied.effect.on_channel.by_value
+    if applied.effect.stage != "load_cells" or not by_value or applied.effect.needs_signal:
+        return False
+    view = CaseView(problem, applied.channel, applied.source)
+    text = view.unit()
+    of_cells = text is None or unit(text).dimension in _OF_CELLS
+    return of_cells and applied.is_unusual(view, log_density=PRIORS.within**2 / 2)
+
+
+def _is_beyond_sensors(problem: Problem, applied: AppliedEffect) -> bool:
     """Tell whether a sensor on a scale without a zero of its own has a law of a size that no sensor has.
 
     Its zero counts as well: a load cell is tared and may show anything before, a thermometer is not.

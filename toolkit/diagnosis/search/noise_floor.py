@@ -46,21 +46,25 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
             own = [group for group in listed if group.output == name and group.variables != RUNS]
             follows = _followed(problem, folds, base, name, own, seed + at)
             found += [] if follows is None else [follows]
-            # Of so few independent values nothing can be told apart from anything, noise least of all.
-            few = problem.layout(name).n <= ROWS.fewest * base.noise[name].correlation_rows
-            if few and parts.total_sd > _least(problem) * spread(problem, name):
+            if _is_untestable(problem, base, name, parts):
                 found.append(_untested(name, LONG, 0.0))
     return tuple(found)
 
 
-def _least(problem: Problem) -> float:
-    """Return the share of an output's spread from which a rest that wanders so long counts.
+def _is_untestable(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bool:
+    """Tell whether a rest has too few independent values to be told from anything, and matters.
 
-    A plant may wander by itself: process noise. Without a state nothing wanders but the sensor, and one that
-    takes as long as the recording for it is no noise: the simulation is off, if by more than any is.
+    Without a state nothing wanders but the sensor, and one that takes as long as the whole recording is no
+    noise: the simulation is off, if by more than any is. What an equation lacks shows integrated, as an arc
+    as long as a run, however many runs there are: a plant may wander so by itself, but nothing shows that it
+    does where the arcs are far above the sensor's noise.
     """
-    motion = problem.model.capability.motion
-    return NOISE.largest if motion is not None and motion.integrates else VERDICT.accuracy
+    motion, least = problem.model.capability.motion, VERDICT.accuracy * spread(problem, name)
+    rows = problem.layout(name).n
+    if motion is not None and motion.integrates:
+        rows = min(rows, int(np.median([problem.kept[name][run].sum() for run in problem.slices])))
+        least = max(least, NOISE.mismatch * parts.sensor_sd)
+    return rows <= ROWS.fewest * base.noise[name].correlation_rows and parts.total_sd > least
 
 
 def _untested(name: str, reason: str, gain: float) -> StructureFound:

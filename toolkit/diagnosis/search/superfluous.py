@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import fit, replace_effects, sizes_off
-from toolkit.diagnosis.fit.folds import beyond_form, hold_out, unseen_error
+from toolkit.diagnosis.fit.folds import beyond_form, hold_out, matters, unseen_error
 from toolkit.diagnosis.policy import STEP, VERDICT
+from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.forward_step import Rival, score_in_place
 from toolkit.diagnosis.search.in_place import best_in_place
 from toolkit.diagnosis.search.time_budget import BudgetSpentError
@@ -48,7 +49,8 @@ def pruned(
 ) -> tuple[Fit, HeldOut, list[Step]]:
     """Drop effects that the others make superfluous: of which too little is left to say beside them.
 
-    Their held-out score is as good without, or what it takes is no more than the others' own forms are off.
+    Their held-out score is as good without, or what it takes is no more than the others' own forms are off. A
+    law of a cell with a size that no cell has is superfluous where nobody would notice its absence.
     Of two either of which does without the other, that one goes without which unseen rows are foretold best:
     by their score, and where it hardly differs by the error of the simulation itself, for the score of a rest
     that is nearly all wandering weighs slow errors little. What stays for both has its rivals anew.
@@ -71,8 +73,10 @@ def pruned(
             continue
         shorter[step.active.key] = fewer, scores
         form = max((applied.effect.form_error for applied in remaining), default=0.0)
-        if held_base.total - scores.total < STEP.least_gain or not beyond_form(
-            problem, refitted, scores, held_base, form
+        if (
+            held_base.total - scores.total < STEP.least_gain
+            or not beyond_form(problem, refitted, scores, held_base, form)
+            or (is_outsized(problem, step.active) and not matters(problem, scores, held_base, STEP.later))
         ):
             superfluous.append(scores)
     if not superfluous:

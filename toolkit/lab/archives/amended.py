@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from toolkit.audit.archive import ArchiveAudit
     from toolkit.audit.linked import Linked, RestingReport
     from toolkit.errors import ToolkitError
     from toolkit.lab.tire_tests.resolve import Basis, Resolved
@@ -37,7 +38,7 @@ class Amended:
 
 def amend(
     linked: Linked,
-    archive: Path,
+    audited: ArchiveAudit,
     target: Path,
     basis: Basis,
     *,
@@ -46,6 +47,7 @@ def amend(
     """Make the amended report of each report with a manifest that rests on another record than that in force.
 
     They are written to ``reports/`` of the folder, each in a folder named after the report that it replaces.
+    A test with a file whose cells were changed, or may have been, has none: it would be computed from them.
 
     Raises
     ------
@@ -62,11 +64,14 @@ def amend(
     pairs = list(_wanted(linked))
     if not pairs:
         return ()
+    archive, unfit = audited.archive, _unfit(audited)
     template = read_template(home_template("org.docx", basis.home))
     jobs: list[Job] = []
     failed: dict[int, ToolkitError] = {}
     for index, (past, test) in enumerate(pairs):
         try:
+            if test in unfit:
+                raise unfit[test]
             resolved = resolve_test(archive / test, basis)
             out = target / FOLDER / file_name(f"{past.id}-{test}", otherwise=f"report-{index + 1}")
             jobs.append(_job(past, resolved, archive / test, template, out))
@@ -74,13 +79,36 @@ def amend(
             failed[index] = error
         step(past.report)
     # A test of past years may lack what today's template asks for: it prints a visible mark.
-    outcomes = iter(deliver_all(jobs, allow_missing=True))
+    outcomes = iter(deliver_all(jobs, allow_missing=True) if jobs else ())
     return tuple(
         Amended(
             replaces=past.id or past.report, test=test, outcome=failed[i] if i in failed else next(outcomes)
         )
         for i, (past, test) in enumerate(pairs)
     )
+
+
+def _unfit(audited: ArchiveAudit) -> dict[str, ToolkitError]:
+    """Return the tests that cannot be computed from their cells, each with its first file that says so."""
+    from toolkit.audit.corrected import DISPUTED, disagreement
+    from toolkit.audit.sides import disputed
+    from toolkit.errors import RecordingError
+
+    unfit: dict[str, ToolkitError] = {}
+    for plain in audited.files.plain():
+        test = plain["test"]
+        if test is None or test in unfit or not disputed(plain):
+            continue
+        unfit[test] = RecordingError(
+            "the test cannot be computed again from its cells",
+            where=audited.shown(test),
+            got=f"{plain['path']}: {disagreement(plain)}",
+            expected="cells as they were recorded",
+            next_step="restore the file as the acquisition program wrote it and audit again, or amend the "
+            "report by hand",
+            rule=DISPUTED,
+        )
+    return unfit
 
 
 def _wanted(linked: Linked) -> Iterator[tuple[RestingReport, str]]:

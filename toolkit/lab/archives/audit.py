@@ -9,7 +9,7 @@ import contextlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +74,8 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
     stage = stage or _silent
     registry = open_registry(order.basis.calibrations, order.basis.home)
     names = inventory(order.archive)
-    past = None if order.reports is None else read_reports(order.reports)
+    unread: list[Finding] = []
+    past = None if order.reports is None else read_reports(order.reports, unread)
     drift = None if order.since_good is None else drift_since(registry, order.since_good)
     if order.repair is not None:
         check_target(order.archive, order.repair)
@@ -85,11 +86,12 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
         from toolkit.report.word.package import read_template
 
         opened = read_template(order.template)
-    with stage(len(names), "audit") as step:
+    with stage(len(names.files), "audit") as step:
         results = audit_archive(
             order.archive, registry, known_at=order.basis.known_at, workers=order.workers,
             scheduler=order.scheduler, step=step, names=names, out=order.out,
         )  # fmt: skip
+        results = replace(results, findings=(*results.findings, *unread))
     drifted: tuple[DriftedFile, ...] = ()
     if drift is not None:
         with stage(None, "since the last good one") as step:
@@ -105,7 +107,7 @@ def audit(order: AuditOrder, *, stage: Stage | None = None) -> tuple[AuditOutcom
     amended: tuple[Amended, ...] = ()
     if order.repair is not None and linked is not None:
         with stage(None, "amended reports") as step:
-            amended = amend(linked, order.archive, order.repair, order.basis, step=step)
+            amended = amend(linked, results, order.repair, order.basis, step=step)
     answer = AuditOutcome(
         made=results,
         linked=linked,

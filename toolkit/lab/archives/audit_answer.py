@@ -18,7 +18,7 @@ from toolkit.calibration.registry.registry import RefusedRecord, Registry
 from toolkit.calibration.registry.standing import approved_after
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import ErrorEntry, one_line, table
+from toolkit.lab.answers import ErrorEntry, counted, one_line, table
 from toolkit.lab.archives.audit_headline import Headline, headline
 
 if TYPE_CHECKING:
@@ -130,6 +130,7 @@ class AuditAnswer(TypedDict):
 
 
 _SHOWN, _SETTINGS, _PATH = 40, 10, 40
+_TROUBLES = ("unreadable-folder", "registry-damaged", "ledger-time")  # what no row of a file can tell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -232,6 +233,12 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
     lines += [one_line(f"{count} files: {message}") for message, count in settings.most_common(_SETTINGS)]
     if len(settings) > _SETTINGS:
         lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
+    troubles = [f"{f.where}: {f.message}" for f in audit.findings if f.rule in _TROUBLES]
+    lines += [one_line(text) for text in troubles[:_SETTINGS]]
+    if len(troubles) > _SETTINGS:
+        lines.append(
+            f"... and {len(troubles) - _SETTINGS} more of folders and ledgers; --json tells all of them"
+        )
     lines += [f"refused record {record.id}: {record.reason}" for record in audit.refused]
     lines += [f"head of {name}: {head}" for name, head in audit.heads]
     return "\n".join([*lines, *_asked(answer, width)])
@@ -277,7 +284,7 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
             why = why if report.to_amend else "stands"
             if report.disputed:
                 why += f"; in {report.disputed} of {report.files} files the cells are changed, or may be"
-            tests = ", ".join(sorted(report.tests))
+            tests = ", ".join(answer.made.shown(test) for test in sorted(report.tests))
             yield one_line(
                 f"report {report.report} ({tests}): {why}"
                 if report.files
@@ -285,7 +292,8 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
             )
         if answer.linked.unknown:
             unknown = answer.linked.unknown
-            yield one_line(f"report unknown: {len(unknown)} tests, {', '.join(unknown[:10])}")
+            first = ", ".join(answer.made.shown(test) for test in unknown[:10])
+            yield one_line(f"report unknown: {counted(len(unknown), 'test')}, {first}")
     if answer.drift is not None:
         drift = answer.drift
         yield ""
@@ -315,7 +323,7 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
         )
         for amended in answer.amended:
             pdf = amended.as_dict()["pdf"]
-            yield f"{pdf or 'NO REPORT: ' + str(amended.outcome)} replaces {amended.replaces}"
+            yield one_line(f"{pdf or f'NO REPORT: {amended.outcome}'} replaces {amended.replaces}")
 
 
 def _rows(audit: ArchiveAudit) -> Iterator[list[str]]:

@@ -19,8 +19,11 @@ from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
 if TYPE_CHECKING:
-    from toolkit.diagnosis.case.case import Case
+    from toolkit.arrays import Array
+    from toolkit.diagnosis.answer.answer import DiagnosedEffect
+    from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.simulators.simulator import Output
     from toolkit.planning.members import Member
     from toolkit.planning.next_run import NextRun
     from toolkit.planning.run_changes import RunLimits
@@ -85,7 +88,7 @@ def plan_next(
     from toolkit.lab.studies.diagnosis import machine_registry
     from toolkit.planning.members import class_of, members_of
     from toolkit.planning.next_run import RunSearch
-    from toolkit.planning.run_changes import Change, RunLimits
+    from toolkit.planning.run_changes import Change, RunLimits, movable
 
     stated = None if case is None else read_case(case)
     diagnosis, file = read_answer(source)
@@ -120,9 +123,11 @@ def plan_next(
     if chosen is None or repeat is None:
         raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
                      "look at the case's simulation")  # fmt: skip
-    plan = _plan(
-        read, diagnosis.effects, members, chosen, repeat, len(search.judged), time.monotonic() < ends
-    )
+    complete = time.monotonic() < ends
+    if len(chosen.together) * 2 == len(chosen.pairs):
+        raise _nothing_parts(chosen, effect, complete=complete)
+    driven = [name for name, _ in movable(problem, reach)]
+    plan = _plan(read, diagnosis.effects, members, chosen, repeat, driven, len(search.judged), complete)
     answer = extended(PlanNextAnswer, plan, out=out)
     if out is not None:
         figures = plots(problem, members, chosen)
@@ -130,7 +135,8 @@ def plan_next(
         sheet = next_sheet(plan, figures, date.today())  # noqa: DTZ011
         written = write_plan(files, out, sheet, template, answer)
         answer = dataclasses.replace(answer, document=written, files=tuple(files))
-    return answer, plan_text(plan, answer.files) + sheet_text(answer.document)
+    text = plan_text(plan, answer.files, model=file.parent / "model.toml", out=out)
+    return answer, text + sheet_text(answer.document)
 
 
 def _case_of(file: Path) -> Path:
@@ -151,6 +157,11 @@ def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits
     from toolkit.planning.run_changes import RunLimits
 
     names = [channel.name for channel in case.drivers]
+    for option, texts in (("--limit", spans), ("--rate", rates)):
+        stated = [text.partition("=")[0].strip() for text in texts]
+        if twice := sorted({name for name in stated if stated.count(name) > 1}):
+            raise _wrong("a limit is stated twice", option, ", ".join(twice), "each input once",
+                         "leave all but one out")  # fmt: skip
 
     def read(text: str, option: str, form: str, count: int) -> tuple[str, tuple[float, ...]]:
         name, _, numbers = text.partition("=")
@@ -161,7 +172,7 @@ def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits
         rising = len(ends) == count and all(map(math.isfinite, ends)) and (ends[0] < ends[-1] or count == 1)
         if name.strip() not in names or not rising or (count == 1 and ends[0] <= 0):
             raise _wrong("a limit cannot be read", option, text, f"{form} of {', '.join(names)}",
-                         f"write for example SA={'-10..10' if count > 1 else '5'}")  # fmt: skip
+                         f"write for example {names[0]}={'-10..10' if count > 1 else '5'}")  # fmt: skip
         return name.strip(), ends
 
     values = dict(read(text, "--limit", "NAME=LOW..HIGH", 2) for text in spans)
@@ -178,21 +189,21 @@ def _plan(
     members: Sequence[Member],
     chosen: NextRun,
     repeat: NextRun,
+    driven: Sequence[str],
     judged: int,
     complete: bool,
 ) -> NextRunPlan:
     likelihood = {member.label: member.fit.log_posterior for member in members}
     again = {(true, other): gain for true, other, gain in repeat.pairs}
-    names = {
-        name for effect in effects if effect.equivalent_to for name in (effect.name, *effect.equivalent_to)
-    }
+    first, *others = [effect for effect in effects if effect.equivalent_to]
+    names = {first.name, *first.equivalent_to}
     fitted = {member.fit.active[-1].effect.name for member in members}
     run = chosen.run
     return NextRunPlan(
         case_sha256=case.sha256,
         members=tuple(member.label for member in members),
         lost=tuple(sorted(names - fitted)),
-        steps=chosen.change.words(),
+        steps=(*chosen.change.words(), *_ranges(case, run, driven)),
         conditions=dict(run.conditions),
         seconds=float(run.t[-1] - run.t[0]),
         pairs=tuple(
@@ -207,8 +218,24 @@ def _plan(
         together=chosen.together,
         judged=judged,
         complete=complete,
-        assumptions=ASSUMPTIONS,
+        assumptions=(
+            *ASSUMPTIONS,
+            *(f"the class of {other.name} is another one, not planned for here" for other in others),
+        ),
     )  # fmt: skip
+
+
+def _ranges(case: Case, run: Run, driven: Sequence[str]) -> list[str]:
+    """Return how far and how fast each input of a run goes, for who drives the machine."""
+    from toolkit.planning.drives import fastest
+
+    units = {channel.name: channel.unit.replace("*", "·") for channel in case.channels}
+    return [
+        f"{name} from {column.min():.4g} to {column.max():.4g} {units[name]}"
+        + (f", at most {rate:.3g} {units[name]} a second" if case.has_time and rate else "")
+        for name, column in ((name, run.columns[name]) for name in driven)
+        for rate in [fastest(run.t, column)]
+    ]
 
 
 def _files(
@@ -240,39 +267,62 @@ def _files(
 
 
 def _operator(plan: NextRunPlan) -> list[str]:
+    from toolkit.lab.plans.plan_sheets import condition_steps
+
     return [
         f"Next run, {plan.seconds:.0f} s: the inputs over time stand in {INPUTS}.",
         *(f"- {step}" for step in plan.steps),
-        *(f"- condition {key}: {value}" for key, value in plan.conditions.items()),
+        *(f"- {step.action}: {step.applied}" for step in condition_steps(plan)),
         f"It parts: {', '.join(plan.members)}.",
     ]
 
 
 def plots(problem: Problem, members: Sequence[Member], chosen: NextRun) -> tuple[Plot, ...]:
-    """Return a figure of each output: what every member predicts of the run."""
+    """Return two figures of each output: what every member predicts, and how far from the first one."""
     from toolkit.report.content import Curve, Plot
 
     run = chosen.run
     clock = tuple((run.t - run.t[0]).tolist())
-    return tuple(
-        Plot(
-            name=f"next_{output.name}",
+    first = members[0].label
+
+    def plot(output: Output, name: str, y: str, caption: str, columns: Sequence[Array]) -> Plot:
+        return Plot(
+            name=name,
             x_label="t / s" if problem.case.has_time else "row",
-            y_label=f"{output.name} / {output.unit.replace('*', '·')}",
+            y_label=f"{y} / {output.unit.replace('*', '·')}",
             curves=tuple(
-                Curve(label=member.label, x=clock, y=tuple(predicted.outputs[output.name].tolist()),
-                      style="line", group=place)
-                for place, (member, predicted) in enumerate(zip(members, chosen.predicted, strict=True))
+                Curve(label=member.label, x=clock, y=tuple(column.tolist()), style="line", group=place)
+                for place, (member, column) in enumerate(zip(members, columns, strict=True))
             ),
-            caption=f"{output.name} in the run that is proposed, as each member of the class predicts it.",
-            alt=f"{output.name} over time by {', '.join(member.label for member in members)}.",
+            caption=caption,
+            alt=f"{y} over time by {', '.join(member.label for member in members)}.",
         )
-        for output in problem.model.outputs
-    )  # fmt: skip
+
+    figures = []
+    for output in problem.model.outputs:
+        columns = [predicted.outputs[output.name] for predicted in chosen.predicted]
+        noise = members[0].fit.noise[output.name].marginal_sd
+        figures += [
+            plot(
+                output, f"next_{output.name}", output.name,
+                f"{output.name} in the run that is proposed, as each member of the class predicts it.",
+                columns,
+            ),
+            plot(
+                output, f"next_{output.name}_apart", f"{output.name} less that of {first}",
+                f"How far the predictions are from that of {first}; noise of {output.name} has a standard "
+                f"deviation of {noise:.3g} {output.unit.replace('*', '·')}.",
+                [column - columns[0] for column in columns],
+            ),
+        ]  # fmt: skip
+    return tuple(figures)
 
 
-def plan_text(plan: NextRunPlan, files: Sequence[str]) -> str:
-    """Return the run for people: what to do, what it parts and with what chance, what it rests on."""
+def plan_text(plan: NextRunPlan, files: Sequence[str], *, model: Path, out: Path | None) -> str:
+    """Return the run for people: what to do, what it parts and with what chance, what it rests on.
+
+    ``model`` is the answer's model file, which simulates the run; ``out`` the folder of the files.
+    """
     from toolkit.lab.answers import table
 
     rows = [
@@ -284,7 +334,8 @@ def plan_text(plan: NextRunPlan, files: Sequence[str]) -> str:
         *(f"  {step}" for step in plan.steps),
         "",
         table(["if true", "against", "recorded", "by a repeat", "by this run"], rows, align="<<>>>"),
-        "  log-evidence: over 3 the data prefer the first",
+        "  log-evidence: over 3 the data prefer the first. A class may stand against what is recorded, where "
+        "its members are alike on every such machine",
         f"the true member is named by this run in {100 * plan.power:.0f} %, by a repeat in "
         f"{100 * plan.power_of_repeat:.0f} %",
     ]
@@ -295,14 +346,32 @@ def plan_text(plan: NextRunPlan, files: Sequence[str]) -> str:
         lines.append("the search was ended by --budget: a longer one may find a better run")
     lines += ["", "assumed:", *(f"  {text}" for text in plan.assumptions)]
     if files:
-        lines += ["", *(f"written: {name}" for name in files)]
-        pairs = " ".join(f"--condition {key}={value}" for key, value in _simulated(plan.conditions).items())
-        lines.append(f"  toolkit simulate ANSWER/model.toml --inputs {INPUTS} {pairs} --out DIR".rstrip())
+        folder = out or Path()
+        lines += ["", *(f"written: {folder / name}" for name in files)]
+        pairs = [f"--condition {key}={value}" for key, value in _simulated(plan.conditions).items()]
+        rehearsal = ["toolkit simulate", str(model), f"--inputs {folder / INPUTS}", *pairs, "--out DIR"]
+        lines.append(f"  {' '.join(rehearsal)}")
     return "\n".join(lines)
 
 
 def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
+
+
+def _nothing_parts(chosen: NextRun, effect: DiagnosedEffect, *, complete: bool) -> ConfigError:
+    """Return the error of a class that no run within the limits parts, with what would."""
+    from toolkit.diagnosis.answer.next_measurements import apart
+    from toolkit.diagnosis.policy import VERDICT
+
+    most = max(0.0, *(gain for _, _, gain in chosen.pairs))
+    longer = "" if complete else "search longer with --budget, "
+    return ConfigError(
+        "no run within the limits parts the class", where="--limit, --rate",
+        got=f"{' and '.join((effect.name, *effect.equivalent_to))}: expected log-evidence {most:.2g}",
+        expected=f"more than {VERDICT.close:g}; nearest: {'; '.join(chosen.change.words())}",
+        next_step=f"{longer}allow more, record denser rows, or measure by itself: {apart(effect)}",
+        rule="plan-infeasible",
+    )  # fmt: skip
 
 
 def _infeasible(problem: Problem, limits: RunLimits) -> ConfigError:

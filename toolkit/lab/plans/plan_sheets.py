@@ -201,11 +201,17 @@ def _expected(value: PlannedValue, units: PrintedUnits) -> Expected:
     )
 
 
+def condition_steps(plan: NextRunPlan) -> tuple[Step, ...]:
+    """Return the conditions of a run that no step of it states already, for its operator."""
+    return tuple(
+        Step(run="1", action=f"condition {key}", applied=value)
+        for key, value in plan.conditions.items()
+        if f"{key}: {value}" not in plan.steps
+    )
+
+
 def next_sheet(plan: NextRunPlan, plots: Sequence[Plot], issued: dt.date) -> PlanSheet:
     """Return the sheet of a run that parts a class, with what every member predicts of it."""
-    conditions = tuple(
-        Step(run="1", action=f"condition {key}", applied=value) for key, value in plan.conditions.items()
-    )
     return PlanSheet(
         kind="next",
         subject=", ".join(plan.members),
@@ -218,7 +224,7 @@ def next_sheet(plan: NextRunPlan, plots: Sequence[Plot], issued: dt.date) -> Pla
             (pair.true, pair.other, f"{pair.recorded:+.1f}", f"{pair.repeat:.1f}", f"{pair.expected:.1f}")
             for pair in plan.pairs
         ),
-        steps=(*(Step(run="1", action=step, applied="") for step in plan.steps), *conditions),
+        steps=(*(Step(run="1", action=step, applied="") for step in plan.steps), *condition_steps(plan)),
         plots=tuple(plots),
         assumptions=plan.assumptions,
         gives_up=(

@@ -94,6 +94,7 @@ def plan_test(
     demands = tuple(dict.fromkeys(parse_demand(text) for text in order.demands or DEMANDS))
     labels = [demand.label for demand in demands]
     _refuse_doubled(labels, where="--u", what="a characteristic has two demands")
+    _refuse_doubled([str(like) for like in order.like], where="--like", what="a tire is named twice")
     _refuse_endless(order)
     _refuse_before_a_test(order, demands)
     tell("the earlier test")
@@ -154,7 +155,6 @@ def _tires(
     known = [_earlier(order, like) for like in order.like or (None,)]
     if not order.like and not order.spread:
         spread = PASSENGER
-    _refuse_doubled([earlier.tire for earlier, _, _ in known], where="--like", what="a tire is named twice")
     tires = tuple(member for earlier, _, _ in known for member in members(earlier, spread))
     machines = list(dict.fromkeys(earlier.machine.name for earlier in tires))
     if len(machines) > 1 or not shared_loads(tires):
@@ -258,21 +258,24 @@ def _within_its_loads(plan: Plan, like: Path) -> Plan:
 
 
 def _refuse_before_a_test(order: ProtocolOrder, demands: Sequence[Demand]) -> None:
-    """Refuse loads that cannot be read, or that no test simulated for the plan has, and a time that holds no
-    test at them: before any is simulated.
+    """Refuse loads that cannot be read, or that no test simulated for the plan has, slip angles and sweeps
+    that its machine does not make, and a time that holds no test: before any is simulated.
     """
-    from toolkit.planning.design import pace_of
-    from toolkit.planning.protocol_search import refuse_too_short
+    from toolkit.planning.design import pace_of, steps_of
+    from toolkit.planning.protocol_search import refuse_too_short, refuse_unmeasured
+    from toolkit.planning.sweep_search import RELAXATION, sweeping_for
 
     for text in order.loads:
         load_of(text)
-    if not order.loads and math.isinf(order.minutes):
-        return
     known: list[set[float]] = []
     for like in order.like or (None,):
         if like is not None and like.suffix.lower() not in _TIRE_FILES:
             continue
         plan = _virtual_plan(like)
+        refuse_unmeasured(demands, steps_of(plan.machine))
+        for demand in demands:
+            if demand.name == RELAXATION:
+                sweeping_for(demand, plan.machine)
         known.append(set(nominal_loads(order.loads, plan.loads_N)))
         if len(known) == max(len(order.like), 1) and (shared := set.intersection(*known)):
             pace = pace_of(plan.machine, between_files_s=order.between_files_s)

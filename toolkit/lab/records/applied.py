@@ -222,7 +222,7 @@ def apply_answer(
     record: Record, source: Path, out: Path, *, tare: Mapping[str, float] | None, draft: bool
 ) -> tuple[ApplyAnswer, str, Loads]:
     """Compute a file's loads by a record and write them; return both forms of the answer, and the loads."""
-    from toolkit.lab.answers import finding_lines
+    from toolkit.lab.answers import finding_lines, one_line
 
     check_output(out)
     series, of_file = read_indications(source, record)
@@ -238,7 +238,7 @@ def apply_answer(
         "out": out, "rows": rows, "calibration": loads.use.as_dict(), "mark": loads.use.mark, "loads": ranges,
         "findings": [finding.as_dict() for finding in loads.findings],
     }  # fmt: skip
-    lines = [f"{out}: {rows} rows by {record.id} ({loads.use.status})"]
+    lines = [f"{one_line(out)}: {rows} rows by {record.id} ({loads.use.status})"]
     lines += [f"  {name:4s} {_range_text(span)}" for name, span in ranges.items()]
     lines += [loads.use.mark] if loads.use.mark else []
     lines += finding_lines(loads.findings)

@@ -17,6 +17,7 @@ from toolkit.lab.answers import (
     delivered_keys,
     file_name,
     finding_lines,
+    one_line,
 )
 from toolkit.trust.signing import HERE
 
@@ -172,7 +173,7 @@ def certificate_text(certificate: Certificate, delivered: Delivered, sealing: Se
     marks = "  DRAFT" if certificate.draft else "  WITHDRAWN" if certificate.withdrawn else ""
     lines = [
         f"certificate {certificate.id} of {certificate.record}{marks}",
-        *(f"{path}" for path in (delivered.pdf, delivered.docx, *delivered.companions)),
+        *(one_line(path) for path in (delivered.pdf, delivered.docx, *delivered.companions)),
         f"{delivered.pages} pages, {len(delivered.filled.manifest)} values verified",
         f"signature: {delivered.signature}",
         f"sealed by {sealing.key.name}" if sealing else "not sealed: no --seal",

@@ -28,7 +28,7 @@ from toolkit.calibration.registry.store import Change
 from toolkit.errors import ConfigError, RegistryError, TrustError
 from toolkit.files import sha256_file
 from toolkit.inputs import PDF_FILE, read_input
-from toolkit.lab.signatures.proofs import PROOF
+from toolkit.lab.signatures.proofs import PROOF, TESTED
 from toolkit.trust.people import Person, Version, inability, objections
 from toolkit.trust.signing import HERE
 
@@ -120,7 +120,8 @@ def issue(
 ) -> int:
     """Enter that a document was issued over a record; return the entry's number.
 
-    ``document`` has its ``name``, the hash ``content`` of what it says, and those of its files by kind.
+    ``document`` has its ``name``, the hash ``content`` of what it says, those of its files by name, and of a
+    report the day of its test as ``tested``.
     ``decided`` is the hash of the last decision that the document knew of (`Ledger.decided`), ``named`` as of
     `issuers`.
 
@@ -187,15 +188,19 @@ class Issuing:
         names = issuers(self.registry, content.calibrations[0].id, self.named)
         return content.issued_by(" and ".join(names) or None)
 
-    def issue(self, content: ReportContent, *, document: str, decided: str) -> Issue:
+    def issue(
+        self, content: ReportContent, *, document: str, decided: str, tested: str | None = None
+    ) -> Issue:
         """Return what issues a document, such as ``certificate CC-1``.
 
-        ``decided`` is the hash of the last decision that the content knew of.
+        ``decided`` is the hash of the last decision that the content knew of, ``tested`` the day of the test
+        that a report tells of: what is decided of that day later is held against it.
         """
-        return partial(self._issue, content, document, decided)
+        stated = {"name": document} | ({} if tested is None else {TESTED: tested})
+        return partial(self._issue, content, stated, decided)
 
     def _issue(
-        self, content: ReportContent, document: str, decided: str,
+        self, content: ReportContent, stated: Mapping[str, str], decided: str,
         pdf: Path, others: Sequence[Path], pages: int, digest: str,
     ) -> Mapping[str, Any]:  # fmt: skip
         from toolkit.recording.marks import GENERATOR
@@ -205,7 +210,7 @@ class Issuing:
         use = content.calibrations[0]
         place = place_of_symbol(pdf, pages, content)
         hashes = {file.name: _hash(file) for file in others}
-        anchor = self._anchor(use.id, {"name": document, "content": digest, **hashes}, others, decided)
+        anchor = self._anchor(use.id, {**stated, "content": digest, **hashes}, others, decided)
         ledger = {"schema": 1, **anchor.as_dict()}
         for file in others:
             if file.suffix == ".xml":
@@ -213,14 +218,14 @@ class Issuing:
         proof = {
             "generator": GENERATOR,
             "schema": 1,
-            "document": document,
+            "document": stated["name"],
             "records": [{"id": use.id, "sha256": use.sha256}],
             "files": [{"name": file.name, "sha256": sha256_file(file)} for file in others],
             "ledger": ledger,
         }
         text = json.dumps(proof, ensure_ascii=False, indent=1).encode() + b"\n"
         data = proved_pdf(read_input(pdf, PDF_FILE), {PROOF: text}, anchor.compact, place)
-        pdf.write_bytes(data if self.sealing is None else self.sealing.seal_pdf(data, document))
+        pdf.write_bytes(data if self.sealing is None else self.sealing.seal_pdf(data, stated["name"]))
         return ledger
 
     def _anchor(

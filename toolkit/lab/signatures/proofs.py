@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from toolkit.calibration.records.use import UNSIGNED
 from toolkit.calibration.registry.witnessed import ORIGIN, witnessed
+from toolkit.days import parse_day
 from toolkit.errors import ToolkitError
 from toolkit.files import parse_json
 from toolkit.trust.anchor import COMPACT, Anchor, compare, parse_anchor, parse_compact
@@ -22,7 +24,12 @@ from toolkit.trust.seal.check import Signature
 if TYPE_CHECKING:
     from toolkit.calibration.registry.ledger import Entry
     from toolkit.calibration.registry.registry import Registry
+    from toolkit.calibration.registry.status import RecordStatus
 
+CERTIFICATE = "certificate"
+"""First word of the name of a document about a record itself; any other reports a test."""
+TESTED = "tested"
+"""Key of the day of the test, in the entry of a report and in its manifest."""
 PROOF = "toolkit.json"
 """Name of the JSON document in an issued PDF: its records, its ledger's proof, the files issued with it."""
 
@@ -67,11 +74,16 @@ def _anchor(text: str, where: object) -> Anchor | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Named:
-    """A record that a document names, with its hash; ``file``: that of the bytes, of a record's own file."""
+    """A record that a document names, with its hash; ``file``: that of the bytes, of a record's own file.
+
+    ``report``: the document reports a test, on the day ``tested``; None where it does not say on which.
+    """
 
     record: str
     sha256: str
     file: str | None = None
+    report: bool = False
+    tested: date | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +92,8 @@ class LedgerState:
 
     ``signature``, ``issued_by`` and ``issued_at`` are those of the document's entry; ``unsigned`` and None
     where it has none. ``decided_by``: who signed the decisions that its record rests on. ``changed``: why a
-    record's file is not the one that was entered, None where it is.
+    record's file is not the one that was entered, None where it is. ``untold``: whether its record still
+    holds cannot be told, because the document does not say the day of its test.
     """
 
     ledger: Continuity = "unknown"
@@ -91,6 +104,7 @@ class LedgerState:
     issued_at: str | None = None
     decided_by: str | None = None
     changed: str | None = None
+    untold: bool = False
 
 
 Ledger = Callable[[Sequence[Named], Anchor | None], LedgerState]
@@ -108,10 +122,30 @@ def entry_of(anchor: Anchor) -> Mapping[str, Any]:
 
 def hashes_of(anchor: Anchor) -> Mapping[str, str]:
     """Return the hashes that the entry of an issued document holds of its files, by name."""
+    document = _document_of(anchor)
+    return {n: str(value) for n, value in document.items() if n not in ("name", "content", TESTED)}
+
+
+def day_of_test(anchor: Anchor | None, stated: object = None) -> date | None:
+    """Return the day of the test that a report's entry has, else the one ``stated`` beside; None without."""
+    return _day(stated if anchor is None else _document_of(anchor).get(TESTED, stated))
+
+
+def _document_of(anchor: Anchor) -> Mapping[str, Any]:
     document = entry_of(anchor).get("document")
-    if not isinstance(document, dict):
-        return {}
-    return {name: str(value) for name, value in document.items() if name not in ("name", "content")}
+    return document if isinstance(document, dict) else {}
+
+
+def _day(stated: object) -> date | None:
+    try:
+        return parse_day(stated) if isinstance(stated, str) else None
+    except ValueError:
+        return None
+
+
+def reports_test(document: object) -> bool:
+    """Tell by a document's name whether it reports a test: then its record must hold on that test's day."""
+    return str(document).partition(" ")[0] != CERTIFICATE
 
 
 def no_ledger(_names: Sequence[Named], anchor: Anchor | None) -> LedgerState:
@@ -133,21 +167,40 @@ def registry_ledger(open_registry: Callable[[], Registry | None]) -> Ledger:
         registry = open_registry()
         if registry is None:
             return no_ledger(names, anchor)
-        states = [_standing(registry, name) for name in names]
+        states = []
         if anchor is not None:
             states.append(_continuity(registry, anchor))
+            if states[0].ledger == "continues" and states[0].still_holds is None:
+                names = names or _named_by(registry, anchor)
+        states += [_standing(registry, name) for name in names]
         return _joined(states, no_ledger(names, anchor))
 
     return ask
 
 
+def _named_by(registry: Registry, anchor: Anchor) -> tuple[Named, ...]:
+    """Return the record that an entry of a sound ledger here is about: a code on a page names none itself."""
+    instrument = anchor.checkpoint.origin.removeprefix(ORIGIN)
+    if instrument not in registry.instruments():
+        return ()
+    ledger = registry.ledger(instrument)
+    entry = ledger.entries[anchor.index]
+    document = entry.document or {}
+    record = Named(
+        record=entry.id, sha256=str(ledger.entered()[entry.id].record),
+        report=entry.document is not None and reports_test(document.get("name")),
+        tested=_day(document.get(TESTED)),
+    )  # fmt: skip
+    return (record,)
+
+
 def _joined(states: Sequence[LedgerState], nothing: LedgerState) -> LedgerState:
-    known = [state for state in states if state.still_holds is not None or state.ledger != "unknown"]
+    held = [state for state in states if state.still_holds is not None or state.untold]
+    known = [state for state in states if state in held or state.ledger != "unknown"]
     if not known:
         return nothing
     proof = next((state for state in known if state.ledger != "unknown"), nothing)
-    held = [state for state in known if state.still_holds is not None]
-    worst = next((state for state in held if not state.still_holds), held[0] if held else None)
+    worst = min(held, key=lambda state: (state.still_holds is not False, not state.untold), default=None)
     whys = [state.why for state in (proof, worst) if state is not None and state in known]
     return LedgerState(
         ledger=proof.ledger,
@@ -158,6 +211,7 @@ def _joined(states: Sequence[LedgerState], nothing: LedgerState) -> LedgerState:
         issued_at=proof.issued_at,
         decided_by=None if worst is None else worst.decided_by,
         changed=next((state.changed for state in held if state.changed is not None), None),
+        untold=worst is not None and worst.untold,
     )
 
 
@@ -318,8 +372,32 @@ def _standing(registry: Registry, name: Named) -> LedgerState:
         return LedgerState(still_holds=False, why=f"record {name.record} here is another one")
     if name.file is not None and (changed := _not_entered(registry, name.record, name.file)) is not None:
         return LedgerState(still_holds=False, why=changed, changed=changed)
-    if status.state in ("withdrawn", "discarded"):
-        reason = f": {status.reason}" if status.reason else ""
+    reason = f": {status.reason}" if status.reason else ""
+    if name.report and not status.void_always:
+        return _on_its_day(registry, name, status, decided_by)
+    if status.ended:
         why = f"record {name.record} was {status.state} since{reason}"
         return LedgerState(still_holds=False, why=why, decided_by=decided_by)
     return LedgerState(still_holds=True, why=f"record {name.record} is {status.state}", decided_by=decided_by)
+
+
+def _on_its_day(registry: Registry, name: Named, status: RecordStatus, decided_by: str | None) -> LedgerState:
+    """Return whether a report's record is the one in force on the day of its test, by the rule of audits."""
+    from toolkit.calibration.registry.registry import instrument_of
+    from toolkit.calibration.registry.standing import out_of_force
+
+    ended = f"{status.state} since, void from {status.void_from}: {status.reason}" if status.ended else ""
+    if name.tested is None:
+        why = f"whether record {name.record} is the one in force on the day of the test cannot be told: " + (
+            "the document does not state that day"
+        )
+        return LedgerState(
+            untold=True, why=f"{why}; the record was {ended}" if ended else why, decided_by=decided_by
+        )
+    when = f"in force on {name.tested.isoformat()}, the day of the test"
+    objection = out_of_force(registry, instrument_of(name.record), name.record, on=name.tested)
+    if objection is not None:
+        why = f"record {name.record} is not {when}: {objection}"
+        return LedgerState(still_holds=False, why=why, decided_by=decided_by)
+    why = f"record {name.record} is {when}" + (f", and was {ended}" if ended else "")
+    return LedgerState(still_holds=True, why=why, decided_by=decided_by)

@@ -10,7 +10,7 @@ entry.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, TypedDict
@@ -20,16 +20,20 @@ from toolkit.declared.answers import merged
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import parse_json, sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
+from toolkit.lab.answers import one_line
 from toolkit.lab.signatures.proofs import (
     PROOF,
+    TESTED,
     Continuity,
     Ledger,
     Named,
     anchor_in,
+    day_of_test,
     entry_of,
     hashes_of,
     ledger_file_state,
     no_ledger,
+    reports_test,
 )
 from toolkit.trust.anchor import COMPACT, Anchor, parse_anchor
 from toolkit.trust.seal.check import SealCheck, Signature
@@ -45,7 +49,10 @@ _BESIDE = ("*.pdf", "manifest.json")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """The answer of one file; ``over`` is what it was issued over, ``certificate`` the signer's SHA-256."""
+    """The answer of one file; ``over`` is what it was issued over, ``certificate`` the signer's SHA-256.
+
+    ``untold``: the ledger here has its record, and the document does not say on which day it must hold.
+    """
 
     file: str
     kind: Annotated[str, Entry("what the document is")]
@@ -57,13 +64,14 @@ class Verdict:
     why: str = ""
     over: Annotated[str | None, Entry("what it was issued over")] = None
     certificate: Annotated[str | None, Entry("SHA-256 of the signer's")] = None
+    untold: Annotated[bool, Entry(output=False)] = False
 
     @property
     def code(self) -> int:
         """0: it holds; 1: it does not, or nothing proves it; 2: it is forged, or cannot be read."""
         if self.signature == "invalid":
             return 2
-        broken = self.still_holds is False or self.ledger in ("forked", "rolled_back")
+        broken = self.still_holds is False or self.untold or self.ledger in ("forked", "rolled_back")
         return 0 if self.signature == "valid" and not broken else 1
 
     @property
@@ -82,7 +90,7 @@ class Verdict:
         if self.still_holds and _UNPROVED in self.why:
             holds = "the records that it names still hold"
         parts = [f"{self.signature.upper():<9} {self.kind}", issued, holds, self.why]
-        return f"{self.file}: " + "; ".join(part for part in parts if part)
+        return one_line(f"{self.file}: " + "; ".join(part for part in parts if part))
 
 
 class VerifyAnswer(TypedDict):
@@ -152,14 +160,14 @@ def carried(attachments: Mapping[str, bytes], *, where: object) -> Carried:
     """
     try:
         document = parse_json(attachments.get(PROOF, b"{}"))
-        names = tuple(
-            Named(record=str(r["id"]), sha256=str(r["sha256"])) for r in document.get("records", ())
-        )
+        records = [(str(r["id"]), str(r["sha256"])) for r in document.get("records", ())]
         files = {str(f["name"]): str(f["sha256"]) for f in document.get("files", ())}
-        title, proof = document.get("document"), document.get("ledger")
+        title, proof, stated = document.get("document"), document.get("ledger"), document.get(TESTED)
     except (ValueError, RecursionError, AttributeError, TypeError, KeyError):
         return Carried(files={})
     anchor = parse_anchor(proof, where=where) if isinstance(proof, dict) else None
+    report, tested = reports_test(title), day_of_test(anchor, stated)
+    names = tuple(Named(record=r, sha256=digest, report=report, tested=tested) for r, digest in records)
     return Carried(document=title and str(title), names=names, files=files, anchor=anchor)
 
 
@@ -288,7 +296,10 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         why = f"{name} was issued with other files than it lists"
         return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
     check = SealCheck(signature="unsigned", why=f"{len(hashes)} files as listed; no sealed PDF proves it")
-    content = {"ledger": document.get("ledger"), "records": document.get("calibrations", [])}
+    content = {
+        "ledger": document.get("ledger"), "records": document.get("calibrations", []),
+        TESTED: document.get(TESTED),
+    }  # fmt: skip
     proof = carried({PROOF: json.dumps(content).encode()}, where=path)
     if proof.anchor is not None and (broken := _manifested(proof.anchor, hashes)):
         return Verdict(file=str(path), kind="manifest", why=broken)
@@ -350,12 +361,13 @@ def _verdict(
         return verdict
     if proof.broken is not None:
         return replace(verdict, why=proof.broken)
-    state = ledger(_names(proof), proof.anchor)
+    state = ledger(proof.names, proof.anchor)
     time = "time as stated by the signer" if check.at and not check.stamped else ""
     # The records that bytes name may hold; that these are the bytes that were issued, nothing says.
     unproved = _UNPROVED if check.signature == "unsigned" and not entered else ""
     verdict = replace(
         verdict, signature=check.signature, ledger=state.ledger, still_holds=state.still_holds,
+        untold=state.untold,
         why="; ".join(part for part in (check.why, unproved, time, state.why) if part),
     )  # fmt: skip
     if entered and check.signature == "unsigned":
@@ -363,16 +375,6 @@ def _verdict(
             verdict, signature=state.signature, issued_by=state.issued_by, issued_at=state.issued_at
         )
     return verdict
-
-
-def _names(proof: Carried) -> Sequence[Named]:
-    """Return the records that a document names, else the one that its signed entry is about."""
-    if proof.names or proof.anchor is None:
-        return proof.names
-    subject = entry_of(proof.anchor).get("subject")
-    if not isinstance(subject, dict) or not subject.get("sha256"):
-        return ()
-    return (Named(record=str(subject.get("record")), sha256=str(subject["sha256"])),)
 
 
 def _content(path: Path) -> bytes:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from toolkit.effects.applied import SimulatedEffect
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import finding_lines
+from toolkit.lab.answers import finding_lines, one_line
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -184,7 +184,8 @@ def _test(
     }
     wrong = f", with {', '.join(plan.acquisition.negated)} negative" if plan.acquisition.negated else ""
     text = (
-        f"{len(test.files)} recordings of the virtual machine {plan.machine.name} in {out}  SIMULATED\n"
+        f"{len(test.files)} recordings of the virtual machine {plan.machine.name} in {one_line(out)}"
+        "  SIMULATED\n"
         f"  conditions   {TEST}\n  truth        {TRUTH}\n"
         f"  own Fy, Mz   by {record or 'the true map of the cells (no record applies)'}{wrong}"
     )
@@ -321,7 +322,7 @@ def model_answer(
         "files": [name for name, _ in outputs],
         "findings": [finding.as_dict() for finding in findings],
     }
-    lines = [f"{model.title}: {len(outputs)} files of outputs in {out}  SIMULATED"]
+    lines = [f"{model.title}: {len(outputs)} files of outputs in {one_line(out)}  SIMULATED"]
     lines += [f"  effect       {effect.label}" for effect in model.effects]
     return payload, "\n".join([*lines, *finding_lines(findings)])
 

@@ -153,6 +153,7 @@ def provenance(resolved: Resolved, test: Path, *, diagnosis: Path | None = None)
         inputs[diagnosis.name] = sha256_file(diagnosis)
     return {
         "test": reduced.info.name,
+        "tested": reduced.info.date,
         "simulated": reduced.info.simulated,
         "inputs": [{"name": name, "sha256": digest} for name, digest in sorted(inputs.items())],
         "software": {

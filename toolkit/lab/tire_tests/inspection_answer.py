@@ -11,7 +11,7 @@ from toolkit.audit.model import DisagreeingSides, Repair, SkippedRecord
 from toolkit.calibration.registry.registry import RefusedRecord
 from toolkit.declared.answers import entry_of, merged
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import finding_lines, table
+from toolkit.lab.answers import finding_lines, one_line, table
 
 if TYPE_CHECKING:
     from toolkit.audit.estimate import Interval
@@ -227,7 +227,7 @@ def inspection_text(inspection: Inspection, intervals: tuple[Interval, ...]) -> 
     recording, context = inspection.recording, inspection.context
     by = {"option": "--machine", "test.toml": "test.toml", "file": "its own properties", "default": "default"}
     lines = [
-        f"{recording.path}" + ("  SIMULATED" if recording.simulated else ""),
+        one_line(recording.path) + ("  SIMULATED" if recording.simulated else ""),
         f"  sha256     {recording.sha256}",
         f"  machine    {recording.machine.title} ({recording.machine.name}, by {by[context.machine_source]})",
         f"  test date  {context.date.isoformat() if context.date else 'unknown'}",

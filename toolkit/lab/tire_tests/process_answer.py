@@ -21,6 +21,7 @@ from toolkit.lab.answers import (
     estimate_keys,
     finding_lines,
     mark_words,
+    one_line,
     signature_words,
     table,
 )
@@ -255,8 +256,9 @@ def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:
     reduced = resolved.result.reduced
     mark = "  SIMULATED" if reduced.info.simulated else ""
     used = sum(c.used for c in reduced.conditions)
+    files = len({c.file for c in reduced.conditions})
     lines = [
-        f"{reduced.info.name}: {used} conditions of {len({c.file for c in reduced.conditions})} files{mark}",
+        f"{one_line(reduced.info.name)}: {used} conditions of {files} files{mark}",
         f"calibration {reduced.calibration.id} ({reduced.calibration.sha256[:12]}...)"
         + mark_words(reduced.calibration),
         signature_words(reduced.calibration),

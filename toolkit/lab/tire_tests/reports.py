@@ -23,6 +23,7 @@ from toolkit.lab.answers import (
     finding_lines,
     mark_words,
     needs_attention,
+    one_line,
 )
 
 if TYPE_CHECKING:
@@ -276,7 +277,10 @@ def _job(
     if options.issuing is not None:
         decided = options.issuing.registry.ledger(instrument_of(content.calibrations[0].id)).decided
         content = options.issuing.content(content)
-        issue = options.issuing.issue(content, document=f"report {content.identity}", decided=decided)
+        issue = options.issuing.issue(
+            content, document=f"report {content.identity}", decided=decided,
+            tested=resolved.result.reduced.info.date,
+        )  # fmt: skip
     return Job(
         issue=issue,
         template=options.template,
@@ -334,7 +338,7 @@ def report_text(report: MadeReport) -> str:
     """Return a report for people: its files, what was verified, its findings."""
     resolved, delivered = report.resolved, report.outcome
     if resolved is None or isinstance(delivered, Exception):
-        return f"{report.test}: no report\n{delivered}"
+        return f"{one_line(report.test)}: no report\n{delivered}"
     use = resolved.result.reduced.calibration
     marks = (
         ("  SIMULATED" if resolved.result.reduced.info.simulated else "")
@@ -343,7 +347,7 @@ def report_text(report: MadeReport) -> str:
     )
     lines = [
         *(
-            f"{path}"
+            one_line(path)
             for path in (delivered.pdf, delivered.docx, delivered.manifest, *delivered.extras)
             if path is not None
         ),

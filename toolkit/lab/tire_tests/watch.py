@@ -61,6 +61,7 @@ class WatchLog:
 
     def add(self, look: Round, say: Callable[[str], None]) -> None:
         """Say what is new in a look."""
+        from toolkit.lab.answers import one_line
         from toolkit.lab.tire_tests.reports import attention, named_payload
 
         for report in look.made:
@@ -68,14 +69,15 @@ class WatchLog:
             if self.keep:
                 self.made.append(named_payload(report))
             if not isinstance(report.outcome, Exception):
-                say(f"{report.test}: {report.outcome.pdf}, {report.outcome.pages} pages")
+                say(one_line(f"{report.test}: {report.outcome.pdf}, {report.outcome.pages} pages"))
         before = self.last or Round(made=(), waiting=(), set_aside=())
         for fault in look.set_aside:
             if fault not in before.set_aside:
-                say(f"{fault.test}: set aside, {fault.rule}: {fault.reason.partition(chr(10))[0]}")
+                reason = fault.reason.partition("\n")[0]
+                say(one_line(f"{fault.test}: set aside, {fault.rule}: {reason}"))
         for waits in look.waiting:
             if waits not in before.waiting:
-                say(f"{waits.test}: waiting, {waits.reason}")
+                say(one_line(f"{waits.test}: waiting, {waits.reason}"))
         self.last = replace(look, made=())
 
     def payload(self) -> WatchAnswer:

@@ -252,7 +252,7 @@ def worst_tests(summary: Summary, _style: Style) -> Rows:
             worst = sorted(worst, key=lambda test: -test["FY_max_abs_N"])[:_MOST_TESTS]
     for test in worst:
         yield (
-            test["test"],
+            summary.view.made.shown(test["test"]),
             test["date"],
             f"{test['not_clean']} of {test['files']}",
             f"{test['FY_max_abs_N']:.1f}",
@@ -294,7 +294,7 @@ def reports(summary: Summary, _style: Style) -> Rows:
         yield (
             report.report,
             ", ".join(sorted(report.linked_by)),
-            ", ".join(sorted(report.tests)),
+            ", ".join(map(summary.view.made.shown, sorted(report.tests))),
             f"{report.not_clean} of {report.files}",
         )
 

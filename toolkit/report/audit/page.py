@@ -87,8 +87,8 @@ def page(view: AuditView) -> Iterator[str]:
         estimates=list(islice(_estimates(view.made), _PLACES + 1)),
         most_estimates=_PLACES,
         coefficients=_coefficients,
-        reports=None if view.linked is None else _reports(view.linked.reports),
-        unlinked=() if view.linked is None else view.linked.unknown,
+        reports=None if view.linked is None else _reports(view.made, view.linked.reports),
+        unlinked=() if view.linked is None else tuple(map(view.made.shown, view.linked.unknown)),
         drift=view.drift,
         drifted=sorted(view.drifted, key=lambda file: (file.date, file.path)),
         drifted_tests=view.drifted_tests,
@@ -163,7 +163,7 @@ def _tests(audit: ArchiveAudit) -> Table | None:
     ]
     rows = [
         (
-            test["test"],
+            audit.shown(test["test"]),
             test["date"],
             f"{test['not_clean']} of {test['files']}",
             *(_largest(test["effects"], name, percent=unit is None) for name, unit in characteristics),
@@ -199,12 +199,12 @@ def _coefficients(equation: Mapping[str, Any]) -> Table:
     return table(("term", "estimate", "from", "to"), rows, numbers=(1, 2, 3))
 
 
-def _reports(reports: Iterable[RestingReport]) -> Table:
+def _reports(audit: ArchiveAudit, reports: Iterable[RestingReport]) -> Table:
     rows = [
         (
             report.report,
             ", ".join(sorted(report.linked_by)) or "nothing",
-            ", ".join(sorted(report.tests)),
+            ", ".join(map(audit.shown, sorted(report.tests))),
             f"{report.not_clean} of {report.files}",
         )
         for report in reports

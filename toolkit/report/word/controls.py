@@ -66,6 +66,18 @@ def hold_anything(sdt: Element) -> None:
             properties.remove(element)
 
 
+def admit(element: Element) -> None:
+    """Make controls of plain text in and around an element ones of rich text, where they hold more than text.
+
+    Word takes a document for damaged whose control of plain text holds a picture.
+    """
+    for sdt in (*element.iter(W_SDT), *element.iterancestors(W_SDT)):
+        properties = sdt.find(SDT_PR)
+        if properties is not None and next(sdt.iter(q("w:drawing"), q("w:br")), None) is not None:
+            for plain in properties.findall(q("w:text")):
+                properties.remove(plain)
+
+
 def release(paragraph: Element) -> None:
     """Settle the controls of others around a paragraph's literals: Word would show their own data again."""
     holders = [t for t in visible_texts(paragraph) if "{{" in (t.text or "") or "}}" in (t.text or "")]

@@ -18,6 +18,7 @@ from toolkit.report.word.chart import Chart
 from toolkit.report.word.check import LintFinding, check_stories
 from toolkit.report.word.closing import close
 from toolkit.report.word.controls import (
+    admit,
     apply_condition,
     fill_control,
     fill_literals,
@@ -332,6 +333,7 @@ class _Filler:
             fill_literals(site.element, resolve)
             for tag in figures:
                 insert_at_mark(site.element, _MARK, self._picture(tag, site))
+            admit(site.element)
             if id(site.element) in naming:
                 _drop_if_empty(site.element)
 
@@ -345,6 +347,7 @@ class _Filler:
         if site.tag.family == "chart":
             hold_anything(site.element)
         replace_content(site.element, run)
+        admit(site.element)
 
     def _drawable(self, tag: Tag) -> bool:
         return tag.name in (self.pictures if tag.family == "figure" else self.content.plots)
