@@ -42,9 +42,7 @@ class _Worker:
 class _Rows:
     """Which rows count, and which are held out."""
 
-    isolated: float = _set(
-        8.0, "robust sd from the neighbours' median", "no physics does that in one row: it is an outlier"
-    )
+    isolated: float = _set(8.0, "robust sd from the neighbours' median", "no physics does that in one row")
     outliers: float = _set(0.03, "of a run's rows", "more than that is no outlier but a pattern")
     sharp: float = _set(0.5, "of a run's outliers", "beside sharp moves of an input: they may answer it")
     coincidence: float = _set(0.001, "chance of as many", "beside turns of the input: a dozen do not by it")
@@ -80,9 +78,7 @@ class _Priors:
     within: float = _set(4.0, "prior sd", "further off it is not uncertain but imitates an effect: a bound")
     far: float = _set(3.0, "prior sd", "one in 370 by chance: beyond, the fit has absorbed what was left out")
     end: float = _set(3.98, "prior sd", "a parameter that far is at its bound, to the fit's own tolerance")
-    moved: float = _set(
-        1.0, "prior sd", "a refit that went farther may have left what an effect needs: fits begin at both"
-    )
+    moved: float = _set(1.0, "prior sd", "a refit beyond may have left what an effect needs: both begin fits")
     wider: float = _set(10.0, "prior sd", "so wide, a prior decides nothing, and its parameter keeps a scale")
     masked: int = _set(
         4, "candidates", "of those seen from the declared values, fitted jointly where a prior is far off"
