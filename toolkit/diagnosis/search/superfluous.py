@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import fit, replace_effects, sizes_off
-from toolkit.diagnosis.fit.folds import beyond_form, hold_out, matters, unseen_error
+from toolkit.diagnosis.fit.folds import beyond_form, hold_out, unseen_error
+from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.policy import STEP, VERDICT
 from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.forward_step import Rival, score_in_place
@@ -50,7 +51,7 @@ def pruned(
     """Drop effects that the others make superfluous: of which too little is left to say beside them.
 
     Their held-out score is as good without, or what it takes is no more than the others' own forms are off. A
-    law of a cell with a size that no cell has is superfluous where nobody would notice its absence.
+    law of a cell with a size that no cell has is superfluous where the others take nearly all without it.
     Of two either of which does without the other, that one goes without which unseen rows are foretold best:
     by their score, and where it hardly differs by the error of the simulation itself, for the score of a rest
     that is nearly all wandering weighs slow errors little. What stays for both has its rivals anew.
@@ -76,16 +77,14 @@ def pruned(
         if (
             held_base.total - scores.total < STEP.least_gain
             or not beyond_form(problem, refitted, scores, held_base, form)
-            or (is_outsized(problem, step.active) and not matters(problem, scores, held_base, STEP.later))
+            or (is_outsized(problem, step.active) and _takes_nearly_all(problem, refitted, scores, fewer))
         ):
             superfluous.append(scores)
     if not superfluous:
         return base, held_base, steps
-    near = max(scores.total for scores in superfluous) - STEP.least_gain
-    base, held_base = min(
-        ((fewer, scores) for fewer, scores in shorter.values() if scores.total > near),
-        key=lambda entry: unseen_error(problem, entry[1]),
-    )
+    best = max(scores.total for scores in superfluous)
+    alike = [entry for entry in shorter.values() if best - STEP.least_gain < entry[1].total <= best]
+    base, held_base = min(alike, key=lambda entry: unseen_error(problem, entry[1]))
     fits = {applied.key: applied for applied in base.active}
     steps = [
         replace(
@@ -96,6 +95,26 @@ def pruned(
         if step.active.key in fits
     ]
     return pruned(problem, folds, base, held_base, refitted, steps, listed)
+
+
+def _takes_nearly_all(problem: Problem, refitted: HeldOut, held_out: HeldOut, made: Fit) -> bool:
+    """Tell whether effects take nearly all that is above the sensor's own noise on unseen rows.
+
+    Parameters
+    ----------
+    refitted : the held-out rows without any effect
+    held_out, made : the rows beside the effects, and their fit
+    """
+    shares = []
+    for name in problem.names:
+        before, after = (
+            float(np.mean(problem.judged(name, problem.observed[name] - unseen.simulated[name]) ** 2))
+            for unseen in (refitted, held_out)
+        )
+        sensor = noise_parts(problem, made, name).sensor_sd ** 2
+        if before > VERDICT.shown * sensor:
+            shares.append((before - after) / (before - sensor))
+    return bool(shares) and min(shares) > VERDICT.nearly
 
 
 def _rivals(
