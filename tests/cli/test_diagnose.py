@@ -53,7 +53,7 @@ def test_what_was_left_out_is_named_shown_and_predicted(run, tmp_path):
     assert drag["value"] == pytest.approx(800.0, abs=60.0)
     (one,) = made["fit"]["held_out"]
     assert set(one) == {
-        "channel", "unit", "nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor",
+        "channel", "unit", "nominal_rmse", "refitted_rmse", "augmented_rmse", "noise_floor", "spread",
         "with_laws_rmse", "noise",
     }  # fmt: skip
     assert one["with_laws_rmse"] is None

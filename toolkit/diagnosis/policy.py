@@ -43,14 +43,11 @@ class _Worker:
 class _Rows:
     """Which rows count, and which are held out."""
 
-    isolated: float = _set(
-        8.0, "robust sd from the neighbours' median", "no physics does that in one row: it is an outlier"
-    )
+    isolated: float = _set(8.0, "robust sd from the neighbours' median", "no physics does that in one row")
     outliers: float = _set(0.03, "of a run's rows", "more than that is no outlier but a pattern")
     sharp: float = _set(0.5, "of a run's outliers", "beside sharp moves of an input: they may answer it")
-    coincidence: float = _set(
-        0.001, "chance of as many", "a lone outlier may stand beside a turn of the input; a dozen do not"
-    )
+    coincidence: float = _set(0.001, "chance of as many", "beside turns of the input: a dozen do not by it")
+    smooth: float = _set(2.0, "times a mismatch's noise", "a rougher recording does not lead from row to row")
     fewest_for_outliers: int = _set(12, "rows of a run", "fewer have no scatter that a row could be far off")
     folds: int = _set(5, "parts", "each fit sees four fifths of the rows, at the price of five fits")
     fewest: int = _set(3, "rows of an output", "with as many nothing can be told apart from anything")
@@ -82,9 +79,7 @@ class _Priors:
     within: float = _set(4.0, "prior sd", "further off it is not uncertain but imitates an effect: a bound")
     far: float = _set(3.0, "prior sd", "one in 370 by chance: beyond, the fit has absorbed what was left out")
     end: float = _set(3.98, "prior sd", "a parameter that far is at its bound, to the fit's own tolerance")
-    moved: float = _set(
-        1.0, "prior sd", "a refit that went farther may have left what an effect needs: fits begin at both"
-    )
+    moved: float = _set(1.0, "prior sd", "a refit beyond may have left what an effect needs: both begin fits")
     wider: float = _set(10.0, "prior sd", "so wide, a prior decides nothing, and its parameter keeps a scale")
     masked: int = _set(
         4, "candidates", "of those seen from the declared values, fitted jointly where a prior is far off"
@@ -471,8 +466,12 @@ class _Verdict:
     open_interval: float = _set(1e5, "times the value", "a wider interval is none: the data leave it open")
     power: float = _set(0.8, "probability", "with which the smallest detectable size would have been found")
     far: float = _set(1e3, "times the usual size", "no response is in proportion over so many sizes")
+    moved: float = _set(0.25, "of an output's range", "a larger response that is not seen is no size to tell")
+    of_a_run: float = _set(
+        0.5, "of the longest run", "a later channel has fewer rows to show it than it loses"
+    )
     observable: float = _set(
-        1e-3, "of a response", "left beside the nominal parameters, or nothing is seen of it"
+        1e-3, "of a response", "left by the nominal parameters, or nothing is seen of it"
     )
 
 

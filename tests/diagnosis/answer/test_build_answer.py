@@ -73,6 +73,21 @@ def test_what_was_left_out_is_told_with_file_row_time_and_value(problem):
     assert "more" not in finding.message
 
 
+def test_of_means_and_of_readings_in_another_order_the_rows_of_the_file_are_told(problem):
+    """Means over four rows have windows of eight; a table's readings are put in the order of their inputs."""
+    kept = problem.kept["F"].copy()
+    kept[[2, 80]] = False
+    first, other = problem.runs
+    rows = 30 + 4 * np.arange(first.rows)[:, None] + np.array([0, 7])
+    back = np.arange(other.rows)[::-1]
+    runs = replace(first, file_rows=rows), replace(other, file_rows=np.column_stack([back, back]))
+    (finding,) = _outliers(
+        problem.case, SimpleNamespace(problem=replace(problem, runs=runs, kept={"F": kept}))
+    )
+    assert "the mean of rows 39 to 46 of the file r0.csv at 0.2 s" in finding.message
+    assert f"row {other.rows} of the file r1.csv" in finding.message
+
+
 def test_of_many_values_left_out_some_are_told_and_the_others_counted(problem):
     kept = problem.kept["F"].copy()
     kept[10:30] = False

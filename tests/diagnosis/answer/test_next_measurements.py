@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import apart, to_find_it
+from toolkit.diagnosis.answer.next_measurements import apart, next_measurements, to_find_it
 from toolkit.diagnosis.search.unexplained import Line
 
 
@@ -134,3 +134,29 @@ def test_a_measurement_names_the_effects_that_it_is_for():
     assert told.count("three speeds") == 1
     assert "(viscous_damping, quadratic_drag)" in told
     assert told.endswith("(coulomb_friction)")
+
+
+@pytest.mark.parametrize(
+    ("rest", "skipped", "sentences"),
+    [
+        (False, (), []),
+        (True, (), ["Vary u slowly and fast, little and much, and record what else may act."]),
+        (
+            False,
+            ("laws",),
+            ["Give the search more time (--budget): it ended before all of its tests were made."],
+        ),
+    ],
+)
+def test_whoever_has_something_left_is_told_what_to_measure(rest, skipped, sentences):
+    """A filter is named, and its class is itself: what asks for a measurement is what it leaves."""
+    search = found("time", inputs=("u",), unit="V", reason="a floor above a tenth of the output's spread")
+    search.problem.runs = (Of(), Of())
+    search.disagreed, search.steps = None, ()
+    named = (Of(name="filter_lag", equivalent_to=()),)
+    assert list(next_measurements(search, named, "named", rest=rest, skipped=skipped)) == sentences
+
+
+def test_the_advice_beside_a_name_is_about_what_it_leaves():
+    (sentence,) = to_find_it(found("run"), subject="What is left")
+    assert sentence.startswith("What is left differs from run to run")

@@ -88,3 +88,31 @@ def test_no_size_is_promised_by_a_search_that_was_cut_short(searched, skipped, p
     told = _told(replace(searched, skipped=(skipped,)))
     assert (told["nonlinearity"].minimum_detectable is not None) is promised
     assert told["nonlinearity"].why == ("" if promised else power.CUT_SHORT)
+
+
+@pytest.mark.parametrize(
+    ("name", "run_s", "responds", "bounds", "is_told"),
+    [
+        ("channel_delay", 8.0, 1.0, None, True),
+        ("channel_delay", 8e-3, 1.0, None, False),  # longer than the recording
+        ("zero_offset", 8.0, 1.0, None, True),
+        ("zero_offset", 8.0, 60.0, None, False),  # it would be half of all that the output moves
+        ("zero_offset", 8.0, 1.0, (-1e-6, 1e-6), False),  # no zero is as far off as this
+    ],
+)
+def test_a_size_beyond_what_the_case_allows_is_no_size(
+    searched: Search, name: str, run_s: float, responds: float, bounds, *, is_told: bool
+) -> None:
+    trial = next(each for each in searched.scored if each.candidate.name == name)
+    problem = searched.problem
+    runs = tuple(replace(run, t=run.t * run_s / run.t[-1]) for run in problem.runs)
+    directions = {output: column * 0 for output, column in trial.directions.items()}
+    directions["F"][0, 0] = responds * 0.008 * np.ptp(problem.observed["F"])
+    if bounds is not None:
+        (size,) = trial.candidate.active.effect.parameters
+        bounded = replace(trial.candidate.active.effect, parameters=(replace(size, bounds=bounds),))
+        candidate = replace(trial.candidate, active=replace(trial.candidate.active, effect=bounded))
+        trial = replace(trial, candidate=candidate)
+    screen = replace(searched.screen, problem=replace(problem, runs=runs))
+    moved = replace(trial, directions=directions)
+    assert power._is_beyond(screen, moved, 0.02, 1.0) is not is_told

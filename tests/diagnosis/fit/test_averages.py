@@ -283,4 +283,6 @@ def test_a_run_that_was_recorded_more_slowly_is_averaged_over_fewer_rows(tmp_pat
     slow = swept(1).iloc[::2]
     quick, slower = averaged(case_of(tmp_path, swept(0), slow), 8).runs
     assert np.diff(quick.t) == pytest.approx(8 * STEP)
+    assert quick.file_rows is not None  # a mean lies in the middle of its rows
+    assert quick.file_rows.mean(axis=1) * STEP == pytest.approx(quick.t - swept(0)["t"].iloc[0])
     assert np.diff(slower.t) == pytest.approx(8 * STEP)

@@ -1,5 +1,6 @@
 """Single rows that stand far off are left out of every fit; what answers a sharp move of an input is kept."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -95,3 +96,47 @@ def test_short_runs_of_readings_have_a_scatter_together():
     problem = readings_of(residuals, LOADS[:6])
     kept = without_outliers(problem, {"U": np.concatenate(residuals)}).kept["U"]
     assert np.flatnonzero(~kept).tolist() == [20]
+
+
+def slow_of(size, seed=4):
+    """A moment that stands, rises within three rows to its peak and sinks again, with noise."""
+    course = np.interp(np.arange(len(T)), [0, 198, 201, 260, 399], [50.0, 50.0, 243.0, 60.0, 40.0])
+    return course, course + np.random.default_rng(seed).normal(0, size, len(T))
+
+
+def test_on_a_ramp_of_the_recording_it_is_the_simulation_that_jumps():
+    """A launch of a car, -99, -231, -243, -207 N m from row to row: a wrong gain shows in it alone."""
+    _, observed = slow_of(0.5)
+    residual = np.random.default_rng(8).normal(0, 0.5, len(T))
+    residual[[199, 200, 201]] += 12.0, 25.0, 30.0  # the third is the peak itself
+    kept = without_outliers(problem_of(observed, np.zeros(len(T))), {"FY": residual}).kept["FY"]
+    assert kept.all()
+
+
+@pytest.mark.parametrize("rows", [[120], [120, 121], [399], [0], [199]])
+def test_a_spike_of_a_smooth_recording_is_left_out(rows):
+    """One reading and two, the first row and the last, and on the ramp itself."""
+    course, observed = slow_of(0.5)
+    observed[rows] += 90.0
+    kept = without_outliers(problem_of(observed, np.zeros(len(T))), {"FY": observed - course}).kept["FY"]
+    assert np.flatnonzero(~kept).tolist() == rows
+
+
+def test_a_reading_off_by_less_than_the_mismatch_scatters_is_an_outlier_of_a_quiet_sensor():
+    """An oscilloscope's single readings 0.6 V off, which rows that stand still to 0.2 V lead nowhere near."""
+    observed = np.round(5 * (15 + np.sin(T / 3))) / 5
+    observed[[50, 200]] += 0.6
+    residual = np.random.default_rng(9).normal(0, 0.08, len(T))
+    residual[[50, 200]] += 1.5
+    problem = replace(problem_of(observed, np.zeros(len(T))), floor={"FY": 0.2 / np.sqrt(12)})
+    assert np.flatnonzero(~without_outliers(problem, {"FY": residual}).kept["FY"]).tolist() == [50, 200]
+
+
+def test_a_spike_of_a_quick_recording_is_told_by_the_simulation_that_follows_it():
+    """Three rows to a period: every value lies far off its neighbours, a spike between two of them too."""
+    course = 100 * np.sin(2 * np.pi * np.arange(len(T)) / 3.1)
+    observed = course + np.random.default_rng(7).normal(size=len(T))
+    row = 100 + int(np.argmin(course[100:110]))
+    observed[row] += 30.0
+    kept = without_outliers(problem_of(observed, np.zeros(len(T))), {"FY": observed - course}).kept["FY"]
+    assert np.flatnonzero(~kept).tolist() == [row]

@@ -58,6 +58,10 @@ def test_the_draws_are_those_of_the_readings(tmp_path: Path) -> None:
     for name, rows in ways(table(LOADS)).items():
         ordered = by_inputs(case := opened(tmp_path / name, rows))
         assert ordered is not None
+        (run,), (as_filed,) = ordered[0].runs, case.runs
+        assert run.file_rows is not None
+        for channel, column in run.columns.items():  # each row is known by where it stands in the file
+            assert column == pytest.approx(as_filed.columns[channel][run.file_rows[:, 0]])
         seeds.append(seed_of(ordered[0]))
         assert seed_of(case) == int(case.sha256[:12], 16)  # of rows that have an order
     assert len(set(seeds)) == 1

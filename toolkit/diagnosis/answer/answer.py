@@ -111,8 +111,13 @@ class DiagnosedEffect:
         tuple[str, ...],
         Entry("effects, last a parameter of the simulation, that this recording cannot tell from it"),
     ]
-    rejected: tuple[RejectedEffect, ...]
+    rejected: Annotated[tuple[RejectedEffect, ...], Entry("the nearest first")]
     evidence: EffectEvidence
+
+    def __post_init__(self) -> None:
+        """Put the nearest rival first, in older answers too: whoever cuts the list drops the farthest."""
+        nearest = sorted(self.rejected, key=lambda other: other.log_likelihood_less)
+        object.__setattr__(self, "rejected", tuple(nearest))
 
     @property
     def key(self) -> EffectKey:
@@ -240,6 +245,9 @@ class HeldOutChannel:
     noise_floor: OrNan
     with_laws_rmse: Annotated[float | None, Entry("with the laws of what has no name too")] = None
     noise: Annotated[ChannelNoise | None, Entry("null where no fit was made, and in older answers")] = None
+    spread: Annotated[
+        float | None, Entry("standard deviation of what was recorded of it; null as of `noise`")
+    ] = None
 
     @property
     def sensor_sd(self) -> float | None:

@@ -95,7 +95,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         next_measurements=(
             *_factor_hints(search, effects),
             *_unit_hints(search, laws),
-            *next_measurements(search, effects, verdict),
+            *next_measurements(search, effects, verdict, rest=left or unknown, skipped=skipped),
         ),
         findings=(
             *findings,
@@ -379,10 +379,13 @@ def _outliers(case: Case, search: Search) -> tuple[Finding, ...]:
 
 
 def _place_of(problem: Problem, name: str, row: int) -> str:
-    """Return file, row below the header, time and value of one recorded value."""
+    """Return file, row below the header, time and value of one recorded value; of a mean its rows."""
     at = next(i for i, place in enumerate(problem.slices) if place.start <= row < place.stop)
     run, inside = problem.runs[at], row - problem.slices[at].start
     time = f" at {run.t[inside]:.6g} s" if problem.case.has_time else ""
     text = channel_unit(problem.case, problem.model, name)
     value = f"{problem.observed[name][row]:.6g}" + ("" if text == "1" else f" {text}")
-    return f"row {inside + 1} of the file {run.name}{time} ({value})"
+    first, last = (inside, inside) if run.file_rows is None else run.file_rows[inside].tolist()
+    if last > first:
+        return f"the mean of rows {first + 1} to {last + 1} of the file {run.name}{time} ({value})"
+    return f"row {first + 1} of the file {run.name}{time} ({value})"

@@ -68,11 +68,11 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
         parameters=tuple(
             EffectEstimate(
                 name=name, value=value, unit=fitted.units[name], runs=runs,
-                ci95=(value - half, value + half)
-                if math.isfinite(half) and half < VERDICT.open_interval * max(abs(value), 1e-300)
-                else None,
+                ci95=_interval(value, half, positive=parameter.bounds[0] >= 0),
             )
-            for name, value, half in zip(fitted.effect.names, values, reach.tolist(), strict=True)
+            for parameter, name, value, half in zip(
+                fitted.effect.parameters, fitted.effect.names, values, reach.tolist(), strict=True
+            )
         ),
         curve=_curve(law, fitted, covariance, _quantile(search)),
         ranges=tuple(
@@ -86,6 +86,21 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
             share_of_gap=min(max(law.share, 0.0), 1.0),
         ),
     )  # fmt: skip
+
+
+def _interval(value: float, half: float, *, positive: bool) -> tuple[float, float] | None:
+    """Return an interval about a value, None where the data leave it open.
+
+    That of a positive quantity, a time constant or a width, is one of its logarithm: none is below zero.
+    """
+    if not half < VERDICT.open_interval * max(abs(value), 1e-300):  # nor is one without a number
+        return None
+    if not positive:
+        return value - half, value + half
+    if not 0 < half < value * math.log(VERDICT.open_interval):
+        return None if half else (value, value)
+    factor = math.exp(half / value)
+    return value / factor, value * factor
 
 
 def _memory(fitted: AppliedEffect) -> float | None:

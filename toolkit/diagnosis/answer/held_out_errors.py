@@ -51,6 +51,7 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutChannel, .
                     math.inf if output.sd is not None else rmse(augmented.simulated[output.name]),
                 ),
                 noise=judged_noise(search, output.name),
+                spread=float(np.std(problem.judged(output.name, problem.observed[output.name]))),
             )
         )
     return tuple(errors)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.answer.answer import DiagnosedEffect, Verdict, cut_short
+from toolkit.diagnosis.answer.answer import DiagnosedEffect, Verdict, cut_short, untested
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
@@ -86,9 +86,20 @@ def implausible(search: Search) -> tuple[str, ...]:
 
 
 def next_measurements(
-    search: Search, effects: tuple[DiagnosedEffect, ...], verdict: Verdict
+    search: Search,
+    effects: tuple[DiagnosedEffect, ...],
+    verdict: Verdict,
+    *,
+    rest: bool,
+    skipped: tuple[str, ...],
 ) -> tuple[str, ...]:
-    """Return a sentence for each measurement that would say more than this case does."""
+    """Return a sentence for each measurement that would say more than this case does.
+
+    Parameters
+    ----------
+    rest : something is left without a name, beside the effects or without any
+    skipped : steps that a spent budget left out, the laws among them
+    """
     sentences = [text for effect in effects if (text := parted(effect))]
     if search.disagreed is not None:
         (low, _, _), (high, _, _) = search.disagreed.ends
@@ -97,8 +108,8 @@ def next_measurements(
             f"The runs disagree about {name}: measure it by itself as it was in {low} and in {high}, and "
             "note what else differed between them."
         )
-    elif verdict == "unknown":
-        sentences += to_find_it(search)
+    elif rest:
+        sentences += to_find_it(search, subject="What is left" if effects else "The mismatch")
     if verdict == "unknown" or effects:
         beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
         near = f"beside {beside}" if effects else f"even beside the nearest effects ({beside})"
@@ -106,10 +117,9 @@ def next_measurements(
             f"Measure {name} by itself: {near} it is far off its prior."
             for name in (implausible(search) if search.steps else ())
         ]
-    if cut_short(search.skipped):
-        sentences.append(
-            "Give the search more time (--budget): it ended before every known effect was tried."
-        )
+    if untested(skipped):
+        untried = "every known effect was tried" if cut_short(skipped) else "all of its tests were made"
+        sentences.append(f"Give the search more time (--budget): it ended before {untried}.")
     elif verdict == "untestable":
         sentences.append(
             "Tighten the priors of the parameters that moved (certificate, data sheet), or "
@@ -120,10 +130,14 @@ def next_measurements(
     return tuple(sentences)
 
 
-def to_find_it(search: Search) -> list[str]:
+def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     """Return what would narrow down a mismatch that no effect explains, by what it depends on.
 
     What can be varied, held or applied follows from the case: how many inputs it has, and of what kind.
+
+    Parameters
+    ----------
+    subject : what the sentences are about: the whole mismatch, or what the effects leave of it
     """
     case = search.problem.case
     variables = dict.fromkeys(
@@ -137,7 +151,7 @@ def to_find_it(search: Search) -> list[str]:
     if varied:
         alone = "alone varied, everything else held" if len(channels) > 1 else "varied in another way"
         sentences.append(
-            f"The mismatch depends on {', '.join(varied)}: repeat the run with {varied[0]} {alone}."
+            f"{subject} depends on {', '.join(varied)}: repeat the run with {varied[0]} {alone}."
         )
     outputs = [output for output in search.problem.model.outputs if output.name in variables]
     for is_load in (True, False):
@@ -146,25 +160,23 @@ def to_find_it(search: Search) -> list[str]:
             "apply known loads over its range" if is_load else "record it small and large, beside a reference"
         )
         if names:
-            sentences.append(f"The mismatch depends on the size of {names}: {known}.")
+            sentences.append(f"{subject} depends on the size of {names}: {known}.")
     found = (structure.line for structure in search.structure if structure.line is not None)
     swings = {(line.angle, line.told): line for line in found}.values()
     sentences += [
-        f"The mismatch swings {line.told.replace(' per', ' times per')} of {line.angle}: {_AT_ANOTHER_SPEED}"
+        f"{subject} swings {line.told.replace(' per', ' times per')} of {line.angle}: {_AT_ANOTHER_SPEED}"
         for line in swings
         if line.angle
     ]
     lines = [line for line in swings if not line.angle]
     if lines:
-        sentences += _swinging(search.problem, lines)
+        sentences += _swinging(search.problem, lines, subject)
     if "run" in variables:
         sentences.append(
-            "The mismatch differs from run to run: repeat one run unchanged, and note what else changed."
+            f"{subject} differs from run to run: repeat one run unchanged, and note what else changed."
         )
     if "time" in variables:
-        sentences.append(
-            f"The mismatch goes with time: {_TO_PART_TIME[min(len(inputs), 2)].format(*inputs)}."
-        )
+        sentences.append(f"{subject} goes with time: {_TO_PART_TIME[min(len(inputs), 2)].format(*inputs)}.")
     return sentences or [_WHERE_NOTHING_TELLS[min(len(inputs), 2)].format(*inputs)]
 
 
@@ -192,7 +204,7 @@ _AT_ANOTHER_SPEED = (
 )
 
 
-def _swinging(problem: Problem, lines: Sequence[Line]) -> list[str]:
+def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str]:
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
     for line in lines:
@@ -202,11 +214,11 @@ def _swinging(problem: Problem, lines: Sequence[Line]) -> list[str]:
             continue
         name, cycles = order
         sentences.append(
-            f"The mismatch swings at {line.told}, {cycles:.3g} times per turn of {name}: {_AT_ANOTHER_SPEED}"
+            f"{subject} swings at {line.told}, {cycles:.3g} times per turn of {name}: {_AT_ANOTHER_SPEED}"
         )
     if unturned:
         listed = " and ".join(unturned)
-        sentences.append(f"The mismatch swings at {listed}: record what turns or swings at this frequency.")
+        sentences.append(f"{subject} swings at {listed}: record what turns or swings at this frequency.")
     return sentences
 
 

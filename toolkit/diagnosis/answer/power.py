@@ -14,6 +14,7 @@ from toolkit.effects.catalogue import effects
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.screen import LinearisedFit, Scored
     from toolkit.diagnosis.search.search import Search
+    from toolkit.effects.effect import EffectParameter
 
 
 NO_PLACE = "no place for it in this case"
@@ -59,8 +60,8 @@ def not_found(
         needed = _noncentrality(alpha, trial.dof)
         size = abs(amplitude) * needed / length if visible and amplitude else None
         times = needed / length if size is not None else 0.0
-        if times * _moved(screen, trial) > 1 or times > VERDICT.far:
-            # At such a size the output would leave its own range, or nothing is known of the response.
+        if times > VERDICT.far or _is_beyond(screen, trial, size or 0.0, times):
+            # No such size is met here, or nothing is known of the response to it.
             visible, beyond = False, beyond | {name}
         smallest = best.get(name)
         if (
@@ -104,6 +105,25 @@ def _unscored(search: Search, name: str) -> str:
     return NO_STEPS if effect.from_digits and not cut_short(search.skipped) else NOT_TRIED
 
 
+def _is_beyond(screen: LinearisedFit, trial: Scored, size: float, times: float) -> bool:
+    """Tell whether a size is more than the case allows: its output's range, its runs, the effect's bounds.
+
+    Parameters
+    ----------
+    size : of the first parameter, off its neutral value
+    times : the size over that of the response
+    """
+    if times * _moved(screen, trial) > VERDICT.moved:
+        return True
+    first = _first(trial)
+    if first is None or first.off is None or not math.isfinite(first.off):
+        return False
+    low, high = first.bounds
+    longest = max(float(run.t[-1] - run.t[0]) for run in screen.problem.runs)
+    late = first.unit == "s" and size > VERDICT.of_a_run * longest
+    return late or not (first.off + size <= high or first.off - size >= low)
+
+
 def _moved(screen: LinearisedFit, trial: Scored) -> float:
     """Return by how much of an output's recorded range a response moves it, the output it moves most."""
     shares = []
@@ -119,19 +139,21 @@ def _distance(screen: LinearisedFit, trial: Scored) -> tuple[float, float, float
     raw = screen.rows(trial.directions)[:, 0]
     length = float(np.linalg.norm(raw))
     off_nominal = raw - screen.coloured.span @ (screen.coloured.span.T @ raw)
-    parameters = trial.candidate.active.searched
     amplitude = 0.0
-    if parameters:
-        # The size of the first direction: what was switched on, off its own neutral value.
-        first = next((parameter for parameter in parameters if parameter.off is not None), None)
-        if first is not None:
-            off = first.off if first.off is not None and math.isfinite(first.off) else 0.0
-            amplitude = trial.start.directions[0][first.name] - off
+    first = _first(trial)
+    if first is not None:
+        off = first.off if first.off is not None and math.isfinite(first.off) else 0.0
+        amplitude = trial.start.directions[0][first.name] - off
     return (
         float(np.linalg.norm(off_nominal)),
         float(np.linalg.norm(off_nominal)) / max(length, 1e-300),
         amplitude,
     )
+
+
+def _first(trial: Scored) -> EffectParameter | None:
+    """Return the parameter of the first direction: what was switched on, off its own neutral value."""
+    return next((size for size in trial.candidate.active.searched if size.off is not None), None)
 
 
 def _noncentrality(alpha: float, dof: int) -> float:

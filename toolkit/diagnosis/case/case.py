@@ -12,6 +12,9 @@ from toolkit.declared import Above, Entry, UnitName
 from toolkit.machine.default import DEFAULT_MACHINE
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from toolkit.arrays import Array
     from toolkit.simulation.model_file import FittedEffect
     from toolkit.simulation.plan_file import CaseParameter
@@ -40,7 +43,9 @@ class Run:
     ``t`` is the time [s]; without a time channel the row's number. ``simulated`` has the other program's
     output of a case of kind ``columns``; ``declared`` the run's table as written; ``filled`` how many
     missing samples of which input were interpolated; ``sha256`` is the file's; ``own`` tells that
-    the machine's acquisition program wrote it; ``hidden`` are the rows of a worksheet that it hides.
+    the machine's acquisition program wrote it; ``hidden`` are the rows of a worksheet that it hides;
+    ``file_rows`` the first and the last row of the file that each row stands for, (n, 2), counted from 0,
+    where that is not the row itself: of means, and of readings in another order.
     """
 
     name: str
@@ -53,6 +58,7 @@ class Run:
     sha256: str = ""
     own: bool = False
     hidden: tuple[int, ...] = ()
+    file_rows: NDArray[np.intp] | None = None
 
     @property
     def rows(self) -> int:

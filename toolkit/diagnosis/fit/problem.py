@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -243,8 +244,9 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
     """Return the problem without single rows that stand far off all their neighbours.
 
     The rows are chosen once, on the residual of the refitted simulation, so that every hypothesis is
-    judged on the same rows. Beside a sharp move of an input a simulation that is late by a part of a row is
-    far off in that row alone: there the recording itself has to leave the range of its neighbours.
+    judged on the same rows. An outlier is one of the recording. Where a recording is smooth, or an input
+    moves sharply, a value to which its neighbours lead is none: there it is the simulation that jumps, as
+    one does that is late by a part of a row, and is far off in that row alone.
     """
     from dataclasses import replace
 
@@ -260,10 +262,16 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
             away = values - _running_median(values)
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
-            least = ROWS.isolated * max(scale, steps, 1e-300)
-            far = np.abs(away) > least
-            alone = _outside_neighbours(problem.observed[name][places]) > least
-            far &= ~beside[counting] | (alone & (not _answers(beside[counting], far)))
+            noise = max(scale, steps, 1e-300)
+            far = np.abs(away) > ROWS.isolated * noise
+            answering = beside[counting] & _answers(beside[counting], far)
+            if problem.case.has_order:
+                recorded = problem.observed[name][places]
+                rough = max(_roughness(recorded), problem.floor[name])
+                smooth = rough < ROWS.smooth * noise
+                least = ROWS.isolated * (rough if smooth else noise)
+                far &= ~(smooth | beside[counting]) | _off_neighbours(recorded, far, least)
+            far &= ~answering
             if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
                 good[places[far]] = False
         counted[name] = good
@@ -310,11 +318,39 @@ def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:
     return beside
 
 
-def _outside_neighbours(values: Array) -> Array:
-    """Return by how much every value is outside the range of the one before and the one behind, (n,)."""
-    before, behind = values[[0, *range(len(values) - 1)]], values[[*range(1, len(values)), -1]]
-    low, high = np.minimum(before, behind), np.maximum(before, behind)
-    return np.asarray(np.maximum(np.maximum(low - values, values - high), 0.0))
+def _roughness(values: Array) -> float:
+    """Return the robust standard deviation of values off the mean of the one before and the one behind."""
+    return 1.4826 * float(np.median(np.abs(np.diff(values, n=2)))) / 2
+
+
+def _off_neighbours(values: Array, far: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+    """Return which of the values that are ``far`` leave what their neighbours lead to by more than ``least``.
+
+    Neighbours lead to whatever lies between the one before and the one behind, and to where the straight
+    line through two on one side ends. A value that leaves it is nobody's neighbour, one that does not is.
+    """
+    off, calm = far.copy(), np.flatnonzero(~far).tolist()
+    rows = np.flatnonzero(far).tolist()
+    while calm and rows:
+        leaving = []
+        for row in rows:
+            at = bisect.bisect(calm, row)
+            leads = []
+            for side in (calm[max(at - 2, 0) : at][::-1], calm[at : at + 2]):
+                leads += values[side[:1]].tolist()
+                if len(side) > 1:
+                    near, farther = side
+                    slope = (values[near] - values[farther]) / (near - farther)
+                    leads.append(float(values[near] + slope * (row - near)))
+            if min(leads) - least <= values[row] <= max(leads) + least:
+                off[row] = False
+                calm.insert(at, row)
+            else:
+                leaving.append(row)
+        if len(leaving) == len(rows):
+            break
+        rows = leaving
+    return off
 
 
 def _running_median(x: Array) -> Array:

@@ -76,6 +76,7 @@ def _ordered(run: Run, order: NDArray[np.intp]) -> Run:
         run,
         columns={name: column[order] for name, column in run.columns.items()},
         simulated={name: column[order] for name, column in run.simulated.items()},
+        file_rows=np.column_stack([order, order]),
     )
 
 

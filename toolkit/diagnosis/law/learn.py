@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.fit.fit import sizes_off
 from toolkit.diagnosis.fit.folds import hold_out, matters
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
@@ -195,7 +196,7 @@ def _by_unseen_runs(
     order = _simplest_first([(each.gain, each.trial, each.fit) for each in shown])
     for gain, trial, refit in order:
         scores = next(each.held_out for each in shown if each.fit is refit)
-        if _told_from_none(refit):
+        if _is_told_from_none(refit, search.screen.trust(refit.noise)):
             p = min(1.0, math.exp(-min(gain, 700.0)))
             return _law(search, base, held_out, trial, refit, scores, p_value=p), refit, scores
     return None
@@ -235,7 +236,7 @@ def _judged(
 ) -> tuple[Law, Fit, HeldOut] | None:
     problem = search.problem
     applied = refit.active[-1]
-    if not _told_from_none(refit):
+    if not _is_told_from_none(refit, search.screen.trust(refit.noise)):
         return None
     scores = held_out
     if trial.form == "event":
@@ -296,17 +297,17 @@ def _law(
     )
 
 
-def _told_from_none(refit: Fit) -> bool:
-    """Tell whether one of the sizes of a fit's last effect, a law, is none only outside of its interval."""
-    from scipy.stats import norm
+def _is_told_from_none(refit: Fit, trust: float) -> bool:
+    """Tell whether the sizes of a fit's last effect, a law, are none only outside of their joint interval.
 
-    reach, applied = float(norm.ppf((1 + VERDICT.interval) / 2)), refit.active[-1]
-    at = len(refit.covariance) - len(applied.searched)
-    sds = np.sqrt(np.clip(np.diag(refit.covariance)[at:], 0.0, None))
-    return any(
-        parameter.off is not None and abs(applied.values[parameter.name]) > reach * sd
-        for parameter, sd in zip(applied.searched, sds.tolist(), strict=True)
-    )
+    Parameters
+    ----------
+    trust : in the covariance of the fit, as in the intervals that are printed
+    """
+    from scipy.stats import chi2
+
+    away, own = sizes_off(refit, refit.active[-1])
+    return bool(own) and away * trust > float(chi2.ppf(VERDICT.interval, len(own)))
 
 
 def _taken(problem: Problem, before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> float:

@@ -83,13 +83,15 @@ def averaged(case: Case, rows: int) -> Case:
     """
     runs = []
     for run in case.runs:
-        mean = windows(case, run, rows).mean
+        of = windows(case, run, rows)
+        mean = of.mean
         runs.append(
             dataclasses.replace(
                 run,
                 t=mean(run.t),
                 columns={name: mean(column) for name, column in run.columns.items()},
                 simulated={name: mean(column) for name, column in run.simulated.items()},
+                file_rows=of.rows[:, [0, -1]],
             )
         )
     channels = tuple(dataclasses.replace(channel, sd=_of_mean(channel.sd, rows)) for channel in case.channels)

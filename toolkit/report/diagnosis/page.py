@@ -97,21 +97,37 @@ def _verdict(diagnosis: Diagnosis) -> str:
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
 
     if diagnosis.verdict == "unknown" and cut_short(diagnosis.skipped):
-        return "Something is missing; the budget was spent before every known effect was tried."
+        spent = "the budget was spent before every known effect was tried"
+        return f"Something is missing{_size(diagnosis)}; {spent}."
     if diagnosis.verdict == "untestable" and diagnosis.skipped:
         return "The budget was spent before this recording could be judged."
     if only_runs_differ(diagnosis):
         return RUNS_DIFFER
-    if diagnosis.laws and not diagnosis.effects:
-        return f"{HEADLINES[diagnosis.verdict]} Its law was learned: {diagnosis.laws[0].sentence}."
+    if diagnosis.verdict == "unknown":
+        missing = f"{HEADLINES['unknown'].removesuffix('.')}{_size(diagnosis)}."
+        if not diagnosis.laws:
+            return missing
+        return f"{missing} Its law was learned: {diagnosis.laws[0].sentence}."
     if diagnosis.verdict == "named" and not any(map(is_told_from_none, diagnosis.effects)):
         return "A known effect may explain the mismatch; none of its sizes is told from none."
     if diagnosis.effects and diagnosis.remaining == "unknown" and diagnosis.laws:
         return f"{HEADLINES[diagnosis.verdict]} What is left follows a law: {diagnosis.laws[0].sentence}."
     if diagnosis.effects and diagnosis.remaining == "unknown":
         # Who reads the first line alone must not take a name for the whole of it.
-        return f"{HEADLINES[diagnosis.verdict]} More is left that no known effect explains."
+        return f"{HEADLINES[diagnosis.verdict]} More is left that no known effect explains{_size(diagnosis)}."
     return HEADLINES[diagnosis.verdict]
+
+
+def _size(diagnosis: Diagnosis) -> str:
+    """Return how large what has no name is, before any law: an output's error, beside all that it varies."""
+    left = {by.channel for by in diagnosis.depends_on} or {by.channel for by in diagnosis.mismatch}
+    errors = [fit for fit in diagnosis.fit.held_out if fit.channel in left or not left]
+    sized = [(fit.augmented_rmse / fit.spread, fit) for fit in errors if fit.spread]
+    if not sized:
+        return ""
+    share, fit = max(sized, key=lambda pair: pair[0])
+    size = with_unit(few(fit.augmented_rmse, 2), fit.unit)
+    return f": {fit.channel} is off by {size}, {few(100 * share, 2)} % of its spread"
 
 
 def simulated(diagnosis: Diagnosis) -> str | None:
