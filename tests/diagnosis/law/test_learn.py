@@ -20,14 +20,10 @@ from toolkit.declared import json_value
 from toolkit.diagnosis.answer.reader import read_answer
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose as diagnose_case
-<<<<<<< HEAD
-from toolkit.diagnosis.search import search, time_budget
-=======
 from toolkit.diagnosis.law.learn import _is_told_from_none
-from toolkit.diagnosis.search import search
+from toolkit.diagnosis.search import search, time_budget
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.law import law_effect
->>>>>>> 52881eef58b65071b508c4b516c3724fbb1a0a27
 
 SIMULATOR = """
 def simulate(inputs, p):
@@ -212,7 +208,6 @@ def test_of_noise_no_law_is_learned(tmp_path):
     assert answer["fit"]["held_out"][0]["with_laws_rmse"] is None
 
 
-<<<<<<< HEAD
 @pytest.mark.parametrize(("spent", "skipped"), [(0.5, ()), (0.8, ("step 1: pairs of candidates",))])
 def test_laws_are_learned_though_the_time_of_pairs_is_over(monkeypatch, tmp_path, spent, skipped):
     """What explains the most here is a law, and pairs before it may be as dear as all single effects."""
@@ -234,7 +229,8 @@ def test_laws_are_learned_though_the_time_of_pairs_is_over(monkeypatch, tmp_path
     answer = diagnose_case(read_case(path), None, budget_s=600.0, tell=tell).diagnosis
     assert (answer.skipped, answer.complete) == (skipped, not skipped)
     assert [(law.form, law.variables) for law in answer.laws] == [("static", ("T",))]
-=======
+
+
 @pytest.mark.parametrize(
     ("sizes", "sd", "correlation", "trust", "is_law"),
     [
@@ -261,4 +257,3 @@ def test_the_sizes_of_a_law_are_told_from_none_together(sizes, sd, correlation, 
     covariance = sd**2 * np.array([[1.0, correlation], [correlation, 1.0]])
     refit = SimpleNamespace(p=np.zeros(0), active=(applied,), covariance=covariance)
     assert _is_told_from_none(refit, trust) is is_law
->>>>>>> 52881eef58b65071b508c4b516c3724fbb1a0a27

@@ -20,7 +20,9 @@ from toolkit.diagnosis.simulators.build_simulator import model_of
 N = 300
 
 
-@pytest.mark.parametrize(("zero", "stays"), [(300.0, ["zero_offset"]), (0.5, ["zero_offset", "nonlinearity"])])
+@pytest.mark.parametrize(
+    ("zero", "stays"), [(300.0, ["zero_offset"]), (0.5, ["zero_offset", "nonlinearity"])]
+)
 def test_a_bend_that_no_cell_has_goes_where_the_others_take_nearly_all(tmp_path, zero, stays):
     """A bend of a third of full scale, beside a zero that is far larger, or smaller."""
     text, frames = cell_case(0.01), {}
