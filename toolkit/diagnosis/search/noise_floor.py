@@ -57,14 +57,18 @@ def _is_untestable(problem: Problem, base: Fit, name: str, parts: ChannelNoise) 
     Without a state nothing wanders but the sensor, and one that takes as long as the whole recording is no
     noise: the simulation is off, if by more than any is. What an equation lacks shows integrated, as an arc
     as long as a run, however many runs there are: a plant may wander so by itself, but nothing shows that it
-    does where the arcs are far above the sensor's noise.
+    does where the arcs are far above the sensor's noise. A noise that remembers its last value alone is no
+    arc: that takes the sensor's noise on top of it, and so a memory of several values.
     """
-    motion, least = problem.model.capability.motion, VERDICT.accuracy * spread(problem, name)
-    rows = problem.layout(name).n
+    motion, size = problem.model.capability.motion, spread(problem, name)
+    rows, noise, least = problem.layout(name).n, base.noise[name], VERDICT.accuracy * size
     if motion is not None and motion.integrates:
-        rows = min(rows, int(np.median([problem.kept[name][run].sum() for run in problem.slices])))
-        least = max(least, NOISE.mismatch * parts.sensor_sd)
-    return rows <= ROWS.fewest * base.noise[name].correlation_rows and parts.total_sd > least
+        if len(noise.reflection) > 1:
+            rows = min(rows, int(np.median([problem.kept[name][run].sum() for run in problem.slices])))
+            least = max(least, NOISE.mismatch * parts.sensor_sd)
+        else:
+            least = NOISE.largest * size
+    return rows <= ROWS.fewest * noise.correlation_rows and parts.total_sd > least
 
 
 def _untested(name: str, reason: str, gain: float) -> StructureFound:

@@ -390,9 +390,14 @@ def _beside_scatter(
         if not listed:
             return bare, scores, [], scatter
         return _beside_scatter(problem, folds, bare, scores, listed)
-    if scatter:
-        held_base = held_out_beside_scatter(problem, folds, held_base)
-    return scattered, held_base, steps, scatter
+    if not scatter:
+        return scattered, held_base, steps, scatter
+    beside = held_out_beside_scatter(problem, folds, held_base)
+    # One step of least squares leads to the values beside a scatter. Of runs that differ by a third of their
+    # size it may lead astray: then unseen rows, which it was to serve, are the worse for it.
+    if matters(problem, beside, held_base, STEP.later):
+        return base, held_base, steps, ()
+    return scattered, beside, steps, scatter
 
 
 def _as_declared(problem: Problem) -> Fit:
