@@ -139,8 +139,11 @@ def _rivals(
         chosen.key: Rival(active=chosen, difference=best)
     }
     if instead is not None:
-        other = next(each for each in instead[0].active if each.key not in {e.key for e in base.active})
-        rivals[other.key] = Rival(active=other, difference=score_in_place(problem, instead[0], other) - own)
+        present, (made, _) = {each.key for each in base.active}, instead
+        for other in made.active:  # a drift with the temperature has its zero beside it
+            if other.key not in present and not other.effect.nuisance:
+                difference = score_in_place(problem, made, other) - own
+                rivals[other.key] = Rival(active=other, difference=difference)
     return tuple(rival for key, rival in rivals.items() if key != applied.key)
 
 
