@@ -65,7 +65,8 @@ def pruned(
     superfluous: list[HeldOut] = []
     for step in steps if len(base.active) > 1 else ():
         remaining = without(base.active, step.active)
-        if not remaining:
+        # What is read off the digits has been foretold there, and no score of unseen rows tells it.
+        if not remaining or step.active.effect.from_digits:
             continue
         try:
             fewer = fit(problem, remaining, start=base.p)
