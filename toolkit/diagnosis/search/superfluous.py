@@ -65,7 +65,7 @@ def pruned(
     superfluous: list[HeldOut] = []
     for step in steps if len(base.active) > 1 else ():
         remaining = without(base.active, step.active)
-        # What is read off the digits has been foretold there, and no score of unseen rows tells it.
+        # A step that is read off the recorded digits changes no score, and is there all the same.
         if not remaining or step.active.effect.from_digits:
             continue
         try:
