@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import cut_short
-from toolkit.diagnosis.answer.held_out_errors import held_out_errors, judged_noise
+from toolkit.diagnosis.answer.held_out_errors import held_out_errors
 from toolkit.diagnosis.answer.next_measurements import implausible
 from toolkit.diagnosis.fit.sensor_noise import spread
 from toolkit.diagnosis.fit.structure import RUNS
 from toolkit.diagnosis.policy import SCREENING, VERDICT
 from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.search import Search
+from toolkit.diagnosis.search.superfluous import takes_nearly_all
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
@@ -180,13 +181,7 @@ def _takes_nearly_all(search: Search) -> bool:
     What foretells all else is not withdrawn for a parameter that is far off beside it: its prior is as likely
     wrong, and the answer gives the parameter with its shift.
     """
-    shares = []
-    for output in held_out_errors(search, unknown=False):
-        before, after = output.refitted_rmse**2, output.augmented_rmse**2
-        sensor = judged_noise(search, output.channel).sensor_sd ** 2
-        if before > VERDICT.shown * sensor:
-            shares.append((before - after) / (before - sensor))
-    return bool(shares) and min(shares) > VERDICT.nearly
+    return takes_nearly_all(search.problem, search.held_refitted, search.held_augmented, search.augmented)
 
 
 def _within_runs(problem: Problem, name: str, error: Array) -> float:

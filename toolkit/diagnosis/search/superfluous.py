@@ -78,7 +78,7 @@ def pruned(
         if (
             held_base.total - scores.total < STEP.least_gain
             or not beyond_form(problem, refitted, scores, held_base, form)
-            or (is_outsized(problem, step.active) and _takes_nearly_all(problem, refitted, scores, fewer))
+            or (is_outsized(problem, step.active) and takes_nearly_all(problem, refitted, scores, fewer))
         ):
             superfluous.append(scores)
     if not superfluous:
@@ -98,7 +98,7 @@ def pruned(
     return pruned(problem, folds, base, held_base, refitted, steps, listed)
 
 
-def _takes_nearly_all(problem: Problem, refitted: HeldOut, held_out: HeldOut, made: Fit) -> bool:
+def takes_nearly_all(problem: Problem, refitted: HeldOut, held_out: HeldOut, made: Fit) -> bool:
     """Tell whether effects take nearly all that is above the sensor's own noise on unseen rows.
 
     Parameters
@@ -107,12 +107,13 @@ def _takes_nearly_all(problem: Problem, refitted: HeldOut, held_out: HeldOut, ma
     held_out, made : the rows beside the effects, and their fit
     """
     shares = []
-    for name in problem.names:
+    for name in (each for each in problem.names if problem.kept[each].any()):
         before, after = (
             float(np.mean(problem.judged(name, problem.observed[name] - unseen.simulated[name]) ** 2))
             for unseen in (refitted, held_out)
         )
-        sensor = noise_parts(problem, made, name).sensor_sd ** 2
+        left = float(np.mean(problem.judged(name, made.residual[name]) ** 2))
+        sensor = min(problem.judged_sd(name, noise_parts(problem, made, name).sensor_sd) ** 2, left)
         if before > VERDICT.shown * sensor:
             shares.append((before - after) / (before - sensor))
     return bool(shares) and min(shares) > VERDICT.nearly
