@@ -201,7 +201,7 @@ def best_step(
         if made.active[-1].effect.needs_signal and not shows_signal(problem, scores, made.active[-1]):
             continue
         standing.append((trial, scores))
-        if not _leaves_more_than_noise(problem, made):
+        if not leaves_more_than_noise(problem, made):
             break
     if not standing:
         return None
@@ -232,7 +232,7 @@ def drifts_faster(problem: Problem, before: Fit, after: Fit) -> bool:
     return any(more > less for less, more in zip(*left, strict=True))
 
 
-def _leaves_more_than_noise(problem: Problem, made: Fit) -> bool:
+def leaves_more_than_noise(problem: Problem, made: Fit) -> bool:
     """Tell whether an output's rest has more in it than what its quickest changes show as the sensor's."""
     parts = [noise_parts(problem, made, name) for name in problem.names if problem.kept[name].any()]
     return any(each.process_sd > each.sensor_sd for each in parts)

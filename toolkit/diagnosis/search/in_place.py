@@ -14,22 +14,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import Fit, jacobian
+from toolkit.diagnosis.fit.fit import Fit, fit, jacobian
+from toolkit.diagnosis.fit.folds import HeldOut, hold_out
 from toolkit.diagnosis.fit.noise import whiten
-from toolkit.diagnosis.policy import FOLLOWING
+from toolkit.diagnosis.policy import FOLLOWING, STEP
 from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.forward_step import (
     Rival,
+    Step,
+    drifts_faster,
     joint_fit,
     least_in_place,
+    leaves_more_than_noise,
     score_in_place,
 )
 from toolkit.diagnosis.search.screen import LinearisedFit
+from toolkit.diagnosis.search.wandering import may_wander
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
+    from toolkit.diagnosis.fit.folds import Folds
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.candidates import CandidateEffect
 
@@ -60,6 +66,48 @@ def best_in_place(
         if key != best and not active.effect.nuisance
     )
     return *fits[best], rivals
+
+
+def foretold_best(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: Sequence[Step]
+) -> tuple[Fit, HeldOut, list[Step]]:
+    """Put in an effect's place what foretells unseen rows better; the better fit then stays in its class.
+
+    Of effects that were fitted at once, or that stand for one that was dropped, the fit alone has chosen.
+    Where more than noise is left, that is also what the fit made of the rest (as in `best_step`).
+    """
+    chosen = list(steps)
+    for i, step in enumerate(steps if leaves_more_than_noise(problem, base) else ()):
+        others = tuple(each for each in base.active if each.key != step.active.key)
+        near = [each for each in step.rivals if each.difference > (STEP.rival - 1) * step.gain]
+        better, best = None, held_base.total + STEP.least_gain
+        for rival in sorted(near, key=lambda each: -each.difference)[: STEP.judged - 1]:
+            if rival.active.key in {each.key for each in others} or may_wander(problem, rival.active):
+                continue
+            try:
+                instead = fit(problem, (*others, rival.active), start=base.p)
+                if only_bends(problem, instead) or drifts_faster(problem, base, instead):
+                    continue
+                scores = hold_out(problem, folds, instead.active, instead)
+            except FitError:  # the simulation does not run with it
+                continue
+            if scores.total > best:
+                better, best = (rival, instead, scores), scores.total
+        if better is not None:
+            rival, base, gained = better[0], better[1], best - held_base.total
+            held_base = better[2]
+            behind = [replace(each, difference=each.difference - rival.difference) for each in step.rivals]
+            chosen[i] = replace(
+                step,
+                active=base.active[-1],
+                held_out_gain=step.held_out_gain + gained,
+                gain=step.gain + rival.difference,
+                rivals=(
+                    Rival(active=step.active, difference=-rival.difference),
+                    *(each for each in behind if each.active.key != rival.active.key),
+                ),
+            )
+    return base, held_base, chosen
 
 
 def _alike(

@@ -26,6 +26,7 @@ from toolkit.diagnosis.policy import BUDGET, STEP, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.channel_factors import leaves_noise, with_units_judged
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
+from toolkit.diagnosis.search.in_place import foretold_best
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise
 from toolkit.diagnosis.search.pairs import best_pair
@@ -264,6 +265,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         if len(steps) > 1:
             budget.check("swaps")
             base, held_base, steps = pruned(problem, folds, base, held_base, held_refitted, steps, listed)
+            budget.check("unseen rows in the place of effects")
+            base, held_base, steps = foretold_best(problem, folds, base, held_base, steps)
     except BudgetSpentError as error:
         skipped.append(str(error))
     base, steps = with_a_size(problem, base, steps)
