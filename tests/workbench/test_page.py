@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from collections.abc import Iterator
@@ -10,8 +11,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
+from tests.report.diagnosis.test_answer import ANSWER as WHOLE
 from tests.workbench.conftest import ROOT, Served, serving
 from tests.workbench.test_app import DARK_PHONE, LIGHT, objections, opened, settled
+from toolkit.declared import json_value
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.jobs import Job, write_job
 from toolkit.lab.laboratory import example, open_laboratory
@@ -19,17 +22,9 @@ from toolkit.lab.laboratory import example, open_laboratory
 ONE, FEW, AUDIT, MANY = map(holding_id, ("tests/one", "tests/few", "audits/one", "audits/many"))
 
 DIAGNOSIS = holding_id("diagnoses/cell")
-ANSWER = {
-    "title": "A cell", "verdict": "named", "remaining": "nothing", "complete": False, "mismatch": [],
-    "draft_reasons": ["the calibration is not approved"], "not_found": [], "nominal_parameters": [],
-    "effects": [{
-        "name": "nonlinearity", "statement": "The channel is not linear.", "equation": "y = q * y^2",
-        "stage": "load_cells", "channel": "F", "reference": "ASTM E74", "equivalent_to": ["drift"],
-        "parameters": [{"name": "q", "value": 1e-5, "unit": "1/N", "ci95": [9e-6, 1.1e-5]}],
-        "evidence": {"held_out_log_score_gain": 12.5, "p_value": 0.001},
-    }],
-    "fit": {"held_out": []}, "next_measurements": ["Load it twice."], "findings": [],
-}  # fmt: skip
+ANSWER = json_value(dataclasses.replace(WHOLE, complete=False)) | {
+    "draft_reasons": ["the calibration is not approved"],
+}
 """An answer that has one of everything that a page shows otherwise seldom."""
 LOST = "20260101T000000-00000001"
 

@@ -157,6 +157,10 @@ class _Averages:
     shortest: int = _set(
         16, "rows of a window", "three octaves: a shorter one tells nothing of quick changes"
     )
+    levels: int = _set(32, "levels of the simulation", "what a bend leaves between two of them is little")
+    bent: float = _set(
+        0.5, "of what is not followed", "stays where a bend is missing; noise stays by any bend"
+    )
     missed: float = _set(
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
     )

@@ -96,6 +96,24 @@ def test_an_unsigned_output_is_no_noise_of_the_inputs(tmp_path: Path) -> None:
     assert rows_of(case_of(tmp_path, *(frame.assign(F=frame["F"].abs()) for frame in frames))) == 1
 
 
+def test_a_limit_of_the_output_is_no_noise_of_the_inputs(tmp_path: Path) -> None:
+    """A turbine's power ends where its text-book cube goes on, and most of the cube's changes with it."""
+    frames = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        wind = 9 + 4 * lfilter([0.3], [1, -0.95], rng.normal(size=900))
+        cube = 2.5 * np.clip(wind, 3, None) ** 3
+        power = np.minimum(cube, 1500) + rng.normal(0, 20, 900)
+        frames.append(pd.DataFrame({"t": np.arange(900) * STEP, "v": wind, "a": 0 * wind, "F": power}))
+    assert rows_of(case_of(tmp_path, *frames, simulator=TURBINE)) == 1
+
+
+TURBINE = """
+import numpy as np, pandas as pd
+def simulate(inputs, p):
+    return pd.DataFrame({"F": 2.5 * np.clip(inputs["v"], 3, None) ** 3})
+"""
+
 CIRCUIT = """
 import numpy as np, pandas as pd
 def simulate(inputs, p):

@@ -52,7 +52,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
     """Return the answer of a search and the laws of its rest; ``findings`` are those on the case itself."""
     problem = search.problem
     unknown = mostly_unknown(search)
-    skipped = search.skipped if laws.complete or search.skipped else (LAWS_STEP,)
+    skipped = (*search.skipped, *(() if laws.complete else (LAWS_STEP,)))
     effects = () if unknown else tuple(_effect(search, step) for step in search.steps)
     if untested(skipped):
         effects = tuple(

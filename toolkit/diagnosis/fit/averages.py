@@ -6,7 +6,8 @@ parameters then go to where the simulation stands still: the dilution by errors 
 whitening. Means over some rows keep the slow changes, in which simulation and recording move together.
 
 How much of a slope is left is told by the coherence of both, run by run: a lag, a wrong sign or a wrong gain
-does not lower it, noise of an input does.
+does not lower it, noise of an input does. A limit or another bend does as well: the recording is held against
+what it is on average where the simulation is alike, too.
 
 Low coherence is also what missing physics looks like. Noise of an input is shown at the input itself: it is
 in its differences from row to row all the time, and not at steps alone; and without it the simulation no
@@ -205,6 +206,7 @@ def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
     from scipy.signal import csd, welch
 
     sums: dict[int, Array] = {}
+    bent = _usual(problem, name, simulated)
     quickest = min(usual_step(run) for run in problem.case.runs)
     for run, place in zip(problem.runs, problem.slices, strict=True):
         step = usual_step(run)
@@ -214,12 +216,17 @@ def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
             length = min(AVERAGES.window, len(at) // AVERAGES.windows)
             if length < AVERAGES.shortest:
                 continue
-            s, y = simulated[place][at], problem.observed[name][place][at]
-            frequencies, moved = welch(s, 1 / step, nperseg=length)
-            recorded = welch(y, 1 / step, nperseg=length)[1]
-            both = np.abs(csd(s, y, 1 / step, nperseg=length)[1]) ** 2
+            y = problem.observed[name][place][at]
+            frequencies, recorded = welch(y, 1 / step, nperseg=length)
             chance = 1 / (2 * len(at) // length - 1)
-            alike = np.clip((both / np.maximum(moved * recorded, 1e-300) - chance) / (1 - chance), 0, 1)
+            followed = []
+            for s in (simulated[place][at], bent[place][at]):
+                moved = welch(s, 1 / step, nperseg=length)[1]
+                both = np.abs(csd(s, y, 1 / step, nperseg=length)[1]) ** 2
+                coherence = both / np.maximum(moved * recorded, 1e-300)
+                followed.append((moved, np.clip((coherence - chance) / (1 - chance), 0, 1)))
+            apart = [float(np.sum((1 - alike) * recorded)) for _, alike in followed]
+            moved, alike = followed[apart[1] < AVERAGES.bent * apart[0]]
             weight = 1 / np.maximum(np.maximum(1 - alike, chance) * recorded, 1e-300)
             shared, foreign = alike * moved, (1 - alike) * moved
             powers = np.stack([shared, foreign, recorded, shared * weight, foreign * weight])
@@ -228,6 +235,18 @@ def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
                 total = len(at) * frequencies[1] * powers[:, octaves == k].sum(axis=1)
                 sums[k] = sums.get(k, 0) + total
     return [Octave(*map(float, sums.get(k, np.zeros(5)))) for k in range(max(sums, default=-1) + 1)]
+
+
+def _usual(problem: Problem, name: str, simulated: Array) -> Array:
+    """Return what an output is on average where the simulation is alike (rows,): whatever bend is missing."""
+    kept = problem.kept[name] & np.isfinite(simulated)
+    order = np.flatnonzero(kept)[np.argsort(simulated[kept], kind="stable")]
+    parts = np.array_split(order, max(min(math.isqrt(len(order)), AVERAGES.levels), 1))
+    levels, means = (
+        np.array([float(np.mean(column[part])) for part in parts if len(part)])
+        for column in (simulated, problem.observed[name])
+    )
+    return np.interp(simulated, levels, means) if len(levels) else np.zeros(len(simulated))
 
 
 def _is_regular(run: Run) -> bool:

@@ -265,7 +265,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         if len(steps) > 1:
             budget.check("swaps")
             base, held_base, steps = pruned(problem, folds, base, held_base, held_refitted, steps, listed)
-            budget.check("unseen rows in the place of effects")
+            budget.check("swaps")
             base, held_base, steps = foretold_best(problem, folds, base, held_base, steps)
     except BudgetSpentError as error:
         skipped.append(str(error))

@@ -17,14 +17,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from toolkit.diagnosis.answer.reader import ANSWER, read_answer
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.estimate import plus_minus
 from toolkit.files import same_file
 from toolkit.inputs import RESULT_FILE, TABLE_FILE, read_input, read_regular
 from toolkit.lab.desk.chart import Chart, Series, sampling
-from toolkit.lab.desk.holdings import ANSWER, CASE, Holdings
+from toolkit.lab.desk.holdings import CASE, Holdings
 from toolkit.lab.desk.uploads import claimed_folder
 from toolkit.publication import publication
+from toolkit.report.diagnosis.page import headline
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
@@ -216,10 +218,6 @@ def _number(stated: Mapping[str, str], key: str, fitted: float, shown: str) -> f
 
 PAGE, PREDICTIONS = "diagnosis.html", "predictions"
 _FIGURE = re.compile(r'<img alt="([^"]*)" src="(data:image/svg\+xml;base64,[A-Za-z0-9+/=]+)">')
-_NEEDED = (
-    "title", "verdict", "remaining", "complete", "mismatch", "effects", "nominal_parameters", "fit",
-    "not_found", "next_measurements", "findings", "draft_reasons",
-)  # fmt: skip
 _CURVES = ("nominal", "refitted", "augmented")
 _FIRST = f"_{_CURVES[0]}"
 _MOST_CHARTS = 24
@@ -227,9 +225,13 @@ _MOST_CHARTS = 24
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenDiagnosis:
-    """An answer; ``figures`` are (text, address of the picture), ``charts`` (file and channel, chart)."""
+    """An answer as its file has it; ``headline`` is the first line of its own page.
+
+    ``figures`` are (text, address of the picture), ``charts`` (file and channel, chart).
+    """
 
     answer: dict[str, Any]
+    headline: str
     figures: tuple[tuple[str, str], ...]
     charts: tuple[tuple[str, Chart], ...]
 
@@ -242,17 +244,17 @@ def read_diagnosis(folder: Path) -> SeenDiagnosis:
     UnreadableError
         it is none; what stands beside it may lack
     """
-    data = read_input(folder / ANSWER, RESULT_FILE)
     try:
-        answer = json.loads(data)
-        lacking = [key for key in _NEEDED if key not in answer]
-    except (ValueError, TypeError) as error:
-        raise _none(folder, str(error)) from error
-    if lacking or not isinstance(answer, dict):
-        raise _none(folder, f"no {', '.join(lacking)}")
+        diagnosis, file = read_answer(folder)
+        answer = json.loads(read_input(file, RESULT_FILE))
+    except ConfigError as error:
+        raise _none(folder, str(error.got)) from error
     charts = tuple(zip(range(_MOST_CHARTS), _answer_charts(folder / PREDICTIONS), strict=False))
     return SeenDiagnosis(
-        answer=answer, figures=tuple(_figures(folder / PAGE)), charts=tuple(chart for _, chart in charts)
+        answer=answer,
+        headline=headline(diagnosis, with_cause=True),
+        figures=tuple(_figures(folder / PAGE)),
+        charts=tuple(chart for _, chart in charts),
     )
 
 
