@@ -157,7 +157,6 @@ class _Averages:
     shortest: int = _set(
         16, "rows of a window", "three octaves: a shorter one tells nothing of quick changes"
     )
-    levels: int = _set(32, "levels of the simulation", "what a bend leaves between two of them is little")
     bent: float = _set(
         0.5, "of what is not followed", "stays where a bend is missing; noise stays by any bend"
     )
@@ -245,9 +244,7 @@ class _Step:
     refined: int = _set(8, "candidates", "fitted jointly, of those that screening ranks first")
     judged: int = _set(3, "joint fits", "held out one after the other, the best first, until one stands")
     rival: float = _set(
-        0.5,
-        "of the best fit's gain",
-        "what a rival has that may foretell better, where more than noise stays",
+        0.5, "of the best fit's gain", "what a rival has that may foretell better beside a rest"
     )
     far_behind: float = _set(0.25, "of the best gain", "a candidate below cannot win a joint fit")
     near: float = _set(

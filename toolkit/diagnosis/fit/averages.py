@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.fit.problem import Problem, Stacked
 
+_LEVELS = 32
+"""Levels of the simulation at which the recording's mean is taken: between two a bend leaves little."""
+
 
 @dataclass(frozen=True, slots=True)
 class Octave:
@@ -241,7 +244,7 @@ def _usual(problem: Problem, name: str, simulated: Array) -> Array:
     """Return what an output is on average where the simulation is alike (rows,): whatever bend is missing."""
     kept = problem.kept[name] & np.isfinite(simulated)
     order = np.flatnonzero(kept)[np.argsort(simulated[kept], kind="stable")]
-    parts = np.array_split(order, max(min(math.isqrt(len(order)), AVERAGES.levels), 1))
+    parts = np.array_split(order, max(min(math.isqrt(len(order)), _LEVELS), 1))
     levels, means = (
         np.array([float(np.mean(column[part])) for part in parts if len(part)])
         for column in (simulated, problem.observed[name])
