@@ -174,7 +174,8 @@ def lateral(run: Run, tire: Tire, base: Scales, e: Effects) -> dict[str, Array]:
     if "drum_runout" in e:
         fy = fy + _revolving(f["DRUM_ANGLE"], e["drum_runout"])
     if "turn_slip" in e:
-        fy = fy - e["turn_slip"]["force"] * np.radians(np.gradient(f["SA"], f["t"])) / f["V"]
+        turning = np.radians(np.gradient(f["SA"], f["t"])) / f["V"]
+        fy = fy - sign * e["turn_slip"]["force"] * turning
     if "hidden_resonance" in e:
         fy = fy + e["hidden_resonance"]["share"] * _resonance(f["t"], fy, e["hidden_resonance"]["frequency"])
     if "hidden_line" in e:  # locked to time, not to any revolution, and slowly detuned

@@ -117,6 +117,21 @@ def test_a_wheel_leans_and_pulls_to_the_same_side_whichever_way_the_drum_turns()
     assert abs(found["forward"]["MZ"][0]) > 0.1
 
 
+def test_half_a_turn_about_the_vertical_turns_the_force_of_a_twisting_patch_round() -> None:
+    """The rate of turn stays, travel and lateral force change their signs."""
+    tire, t = tire_steady.draw_magic_formula(RNG, pressure=False, symmetric=True), np.arange(50) / 160
+    steered = {"t": t, "SA": 4.0 * t, "FZ": np.full(50, 4000.0), "V": np.full(50, 2.0)}
+    twisted = {}
+    for rotation in ("forward", "reverse"):
+        run = Run(name="r", fine=steered, rows=t, conditions={"rotation": rotation})
+        with_it, without = (
+            tire_truth.lateral(run, tire, ONE, e)["FY"] for e in ({"turn_slip": {"force": 900.0}}, {})
+        )
+        twisted[rotation] = with_it - without
+    assert twisted["forward"] == pytest.approx(-900.0 * math.radians(4.0) / 2.0)
+    assert twisted["reverse"] == pytest.approx(-twisted["forward"])
+
+
 def test_conicity_follows_the_tire_when_it_is_turned_round_and_camber_stays_with_the_machine() -> None:
     tire = tire_steady.draw_magic_formula(RNG, pressure=False, camber=True, symmetric=True)
     t = np.arange(50) / 160

@@ -23,6 +23,7 @@ ONE, FEW, AUDIT, MANY = map(holding_id, ("tests/one", "tests/few", "audits/one",
 
 DIAGNOSIS = holding_id("diagnoses/cell")
 ANSWER = json_value(dataclasses.replace(WHOLE, complete=False)) | {
+    "schema": 1,
     "draft_reasons": ["the calibration is not approved"],
 }
 """An answer that has one of everything that a page shows otherwise seldom."""

@@ -152,6 +152,7 @@ def test_whoever_has_something_left_is_told_what_to_measure(rest, skipped, sente
     """A filter is named, and its class is itself: what asks for a measurement is what it leaves."""
     search = found("time", inputs=("u",), unit="V", reason="a floor above a tenth of the output's spread")
     search.problem.runs = (Of(), Of())
+    search.problem.names, search.augmented = (), None  # no output's rest is beyond all noise
     search.disagreed, search.steps = None, ()
     named = (Of(name="filter_lag", equivalent_to=()),)
     assert list(next_measurements(search, named, "named", rest=rest, skipped=skipped)) == sentences

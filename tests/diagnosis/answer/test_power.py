@@ -116,3 +116,26 @@ def test_a_size_beyond_what_the_case_allows_is_no_size(
     screen = replace(searched.screen, problem=replace(problem, runs=runs))
     moved = replace(trial, directions=directions)
     assert power._is_beyond(screen, moved, 0.02, 1.0) is not is_told
+
+
+def test_no_size_is_promised_beside_a_rest_that_no_noise_is(tmp_path) -> None:
+    """A bend of half the range, weighed as a coloured noise, hides what that noise alone would not."""
+    told = {each.name: each for each in not_found(_bent(tmp_path), set(), alpha=1e-4, units={})}
+    assert {each.why for each in told.values() if each.observable} == {power.HIDDEN, power.NO_STEPS}
+    assert all(each.minimum_detectable is None for each in told.values())
+
+
+def _bent(folder) -> Search:
+    """Return the search of a loop and a gap of one long, slow sweep there and back, half of its range."""
+    load = np.concatenate([np.linspace(-40, 40, 300), np.linspace(40, -40, 300)])
+    way = np.concatenate([np.linspace(-1, 1, 300), np.linspace(1, -1, 300)])
+    gap = np.where(np.abs(load) < 15, 0.0, load - 15 * np.sign(load))
+    loop = np.concatenate([np.full(300, -6.0), np.full(300, 6.0)]) * (1 - way**4)
+    force = gap + loop + np.random.default_rng(1).normal(0, 0.1, 600)
+    text = (cell_case(0.01) + '[[recording.run]]\nfile = "r0.csv"\n').replace('time = "t"\n', "")
+    text = text.replace('t = { unit = "s", role = "time" }\n', "")
+    frames = {"r0__csv": pd.DataFrame({"L": load, "F": force}), "r1__csv": None}
+    case = read_case(write_case(folder, text, simulator=CELL, **frames))
+    return search(
+        problem_of(case, model_of(case, None, None)), seed=1, budget=TimeBudget(300, lambda _: None)
+    )

@@ -13,9 +13,10 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
+from toolkit.diagnosis.search.noise_floor import beyond_noise
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
-from toolkit.units import unit
+from toolkit.units import unit, with_unit
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
@@ -110,6 +111,8 @@ def next_measurements(
         )
     elif rest:
         sentences += to_find_it(search, subject="What is left" if effects else "The mismatch")
+    if rest:
+        sentences += _sensors(search)
     if verdict == "unknown" or effects:
         beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
         near = f"beside {beside}" if effects else f"even beside the nearest effects ({beside})"
@@ -128,6 +131,17 @@ def next_measurements(
     if len(search.problem.runs) == 1:
         sentences.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
     return tuple(sentences)
+
+
+def _sensors(search: Search) -> list[str]:
+    """Return that sensors' standard deviations are to be stated, where a rest was weighed as their noise."""
+    outputs = {output.name: output for output in search.problem.model.outputs}
+    return [
+        f"State the standard deviation of {name} (sd) in the case, from its sensor's certificate or a run at "
+        f"rest: {with_unit(f'{part.total_sd:.2g}', outputs[name].unit)} are left and were weighed as noise."
+        for name, part in beyond_noise(search.problem, search.augmented).items()
+        if search.problem.stated_sd(name) is None and part.process_sd > part.sensor_sd
+    ]
 
 
 def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:

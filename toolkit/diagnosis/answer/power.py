@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import AbsentEffect, cut_short
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.search.noise_floor import is_beyond_noise
 from toolkit.effects.catalogue import effects
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ OUTWEIGHED = "found, but what stays without a name outweighs it"
 GIVEN_UP = "found, and given up for what explains as much"
 UNDECIDED = "not decided: it shows, but not that it matters on rows that no fit has seen"
 CUT_SHORT = "not decided: the search ended before all was tried"
+HIDDEN = "no size is promised: what is left is larger than any noise, and may hide it"
 VANISHES = "its response vanishes here, or the free parameters take it all"
 TOO_LARGE = "it would not have been seen at any usual size that leaves the outputs in their own range"
 
@@ -36,8 +38,9 @@ def not_found(
 ) -> tuple[AbsentEffect, ...]:
     """Return every effect that is not named, with its minimum detectable size.
 
-    A size is the power of a whole search: none is promised by one that was cut short, nor of an effect that
-    the recording seems to have, at whatever size, and that was not confirmed.
+    A size is the power of a whole search: none is promised by one that was cut short, nor beside a rest that
+    is too large to be noise and was weighed as if it were, nor of an effect that the recording seems to have,
+    at whatever size, and that was not confirmed.
 
     Parameters
     ----------
@@ -49,6 +52,8 @@ def not_found(
     open_for = dict.fromkeys(search.undecided, UNDECIDED)
     if cut_short(search.skipped):
         open_for = dict.fromkeys(effects(), CUT_SHORT) | open_for
+    elif is_beyond_noise(search.problem, search.augmented):
+        open_for = dict.fromkeys(effects(), HIDDEN) | open_for
     best: dict[str, tuple[float | None, str, bool]] = {}
     beyond: set[str] = set()
     for trial in scored:

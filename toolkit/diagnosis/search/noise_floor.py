@@ -77,11 +77,17 @@ def _untested(name: str, reason: str, gain: float) -> StructureFound:
 
 def is_beyond_noise(problem: Problem, base: Fit) -> bool:
     """Tell whether some output's rest is so large that no colour makes it noise."""
-    for name in problem.names:
-        parts = noise_parts(problem, base, name)
-        if problem.kept[name].any() and not parts.is_sensor and _is_large(problem, base, name, parts):
-            return True
-    return False
+    return bool(beyond_noise(problem, base))
+
+
+def beyond_noise(problem: Problem, base: Fit) -> dict[str, ChannelNoise]:
+    """Return outputs whose rest is so large that no colour makes it noise, with what was taken for theirs."""
+    parts = {name: noise_parts(problem, base, name) for name in problem.names if problem.kept[name].any()}
+    return {
+        name: part
+        for name, part in parts.items()
+        if not part.is_sensor and _is_large(problem, base, name, part)
+    }
 
 
 def _is_large(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bool:
