@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 from toolkit.calibration.records.use import CalibrationUse, signature_of
 from toolkit.declared.answers import entry_of
-from toolkit.errors import ConfigError
+from toolkit.errors import refuse_unknown
 from toolkit.printable import escaped
 
 if TYPE_CHECKING:
@@ -283,11 +283,7 @@ def unit_choice(units: str) -> Style:
     from toolkit.report.style import Style
 
     choices = {"SI": Style(), "lbf": Style(force="lbf", moment="lbf*ft")}
-    if units not in choices:
-        raise ConfigError(
-            f"unknown units {units!r}", where="--units", got=units, expected=", ".join(choices),
-            next_step="name one of those expected", rule="unknown-units",
-        )  # fmt: skip
+    refuse_unknown("units", units, choices, where="--units", rule="unknown-units")
     return choices[units]
 
 
