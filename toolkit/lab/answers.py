@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict, cast
 
 from toolkit.calibration.records.use import CalibrationUse, signature_of
 from toolkit.declared.answers import entry_of
@@ -13,9 +13,12 @@ from toolkit.errors import refuse_unknown
 from toolkit.printable import escaped
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered
+    from toolkit.report.document import DeclaredTable
     from toolkit.report.style import Style
 
 
@@ -172,6 +175,17 @@ def table(
         for row in [header, ["-" * width for width in widths], *rows]
     ]
     return "\n".join(lines)
+
+
+def document_table(declared: DeclaredTable[Any], source: object, style: Style) -> str:
+    """Return a table of texts as a document has it, headed by its columns' names; empty without rows."""
+    rows = [list(map(str, row)) for row in cast("Iterable[Sequence[object]]", declared.build(source, style))]
+    align = "".join(">" if all(map(_is_number, column)) else "<" for column in zip(*rows, strict=True))
+    return table([column.name for column in declared.entry.columns], rows, align=align)
+
+
+def _is_number(text: str) -> bool:
+    return text[:1] in "+-−.0123456789"
 
 
 def _shortened(
