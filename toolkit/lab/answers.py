@@ -299,31 +299,3 @@ def unit_choice(units: str) -> Style:
     choices = {"SI": Style(), "lbf": Style(force="lbf", moment="lbf*ft")}
     refuse_unknown("units", units, choices, where="--units", rule="unknown-units")
     return choices[units]
-
-
-def refuse_unwritable(folder: Path | None) -> None:
-    """Refuse a folder for figures that cannot be written, before anything is.
-
-    Raises
-    ------
-    OutputError
-        ``not-writable``
-    """
-    import os
-
-    from toolkit.errors import OutputError
-
-    if folder is None:
-        return
-    near = folder
-    while not near.exists() and near != near.parent:
-        near = near.parent
-    if not near.is_dir() or not os.access(near, os.W_OK | os.X_OK):
-        raise OutputError(
-            "the figures cannot be written",
-            where=folder,
-            got=f"{near} is {'not writable' if near.is_dir() else 'no folder'}",
-            expected="a folder with write permission",
-            next_step="choose another folder with --figures; nothing was written",
-            rule="not-writable",
-        )

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
-from toolkit.lab.answers import Timing, document_table, findings_text, one_line, refuse_unwritable
+from toolkit.lab.answers import Timing, document_table, findings_text, one_line
 
 if TYPE_CHECKING:
     from datetime import date
@@ -177,8 +177,6 @@ def laboratories_answer(
     from toolkit.report.style import Style
 
     started = time.perf_counter()
-    for folder in (figures, out):
-        refuse_unwritable(folder)
     if sigma is not None and not (math.isfinite(sigma) and sigma > 0):
         raise ConfigError(
             "sigma_pt cannot be used", where="--sigma", got=sigma, expected="a finite number above 0",
