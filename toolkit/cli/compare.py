@@ -94,7 +94,7 @@ def command(
     Example: toolkit compare tests/steel tests/sandpaper --figures figures
     """
     from toolkit.comparison.compare import compare
-    from toolkit.lab.answers import unit_choice
+    from toolkit.lab.answers import document_text, unit_choice
     from toolkit.lab.home import document_template
     from toolkit.lab.tire_tests.compare import read_entries, write_comparison
     from toolkit.lab.tire_tests.compare_answer import compare_answer, comparison_text
@@ -133,10 +133,7 @@ def command(
         compared, style, figures=figures, opened=opened, out=out, units=None if units is None else style
     )
     payload = compare_answer(comparison, attention, drawn, document, output.timing)
-    text = comparison_text(compared, style, drawn)
-    if document is not None:
-        text += f"\n\n{document.pdf}\n{document.docx}\n{document.pages} pages, verified"
-        text += "".join(f"\n  warning {warning}" for warning in document.warnings)
+    text = f"{comparison_text(compared, style, drawn)}\n{document_text(payload['document'])}".rstrip("\n")
     output.answer(payload, text)
     return 1 if document is not None and document.warnings else exit_code(attention)
 

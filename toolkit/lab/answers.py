@@ -277,6 +277,18 @@ def delivered_keys(delivered: Delivered) -> DeliveredDocument:
     return entry_of(DeliveredDocument, delivered, verified=True, figures=figures)
 
 
+def document_text(document: DeliveredDocument | None) -> str:
+    """Return what people read of a delivered document, below the rest of an answer; empty without one."""
+    if document is None:
+        return ""
+    lines = [
+        "",
+        *(one_line(document[kind]) for kind in ("pdf", "docx")),
+        f"{document['pages']} pages, verified",
+    ]
+    return "\n".join([*lines, *(f"  warning {warning}" for warning in document["warnings"])])
+
+
 def file_name(text: str, *, otherwise: str) -> str:
     """Return the name of a test, or the id of a certificate, as a file's name.
 

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
-from toolkit.lab.answers import Timing, document_table, findings_text, one_line
+from toolkit.lab.answers import Timing, document_table, document_text, findings_text, one_line
 
 if TYPE_CHECKING:
     from datetime import date
@@ -201,15 +201,8 @@ def laboratories_answer(
     lines = [f"{text}\n" for text in texts if text]
     lines += [line for measurand in comparison.measurands for line in _precision_lines(measurand)]
     lines += [f"written: {one_line(file)}" for file in drawn.values()]
-    if document is not None:
-        lines += [f"written: {one_line(file)}" for file in (document.docx, document.pdf)]
-        lines += [f"{document.pages} pages, verified", *(f"  warning {text}" for text in document.warnings)]
-    shown = findings_text(comparison.findings)
-    return (
-        answer(comparison) | keys,
-        "\n".join([*lines, *([shown] if shown else [])]),
-        list(comparison.findings),
-    )
+    lines += [text for text in (document_text(keys["document"]), findings_text(comparison.findings)) if text]
+    return answer(comparison) | keys, "\n".join(lines), list(comparison.findings)
 
 
 def _figures(comparison: LaboratoryComparison, folder: Path, together: ExitStack) -> dict[str, Path]:
