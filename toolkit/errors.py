@@ -21,7 +21,10 @@ Anything else that reaches the command line is a bug and ends with exit code 101
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 LONGEST = 1000  # characters of a line of an error; a header of a hundred columns has fewer
 
@@ -173,3 +176,26 @@ class TrustError(ToolkitError):
 
 class OutputError(ToolkitError):
     """A result cannot be written."""
+
+
+def refuse_unknown(
+    noun: str,
+    word: object,
+    choices: Collection[str],
+    *,
+    where: str,
+    rule: str,
+    error: type[ToolkitError] = ConfigError,
+) -> None:
+    """Refuse a word, such as that of an option, that is none of its choices.
+
+    Raises
+    ------
+    ToolkitError
+        an ``error`` of the ``rule``, which names the choices
+    """
+    if word not in choices:
+        raise error(
+            f"unknown {noun} {word!r}", where=where, got=word, expected=", ".join(choices),
+            next_step="name one of those expected", rule=rule,
+        )  # fmt: skip

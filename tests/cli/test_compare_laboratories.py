@@ -58,7 +58,10 @@ def test_people_get_scores_and_precision(path: Path) -> None:
     code, said = run("--laboratories", path, "--reference", "A", "--sigma", "0.2")
     assert code == 0
     assert "s_R" in said
-    assert "E_n" in said
+    rows = [line.split() for line in said.splitlines()]
+    assert ["measurand", "laboratory", "n", "mean", "U", "z", "zeta", "En", "signal"] in rows
+    # B read 10.4 N and 10.2 N, and states U = 0.5 N: the document prints them to its last place.
+    assert ["conicity", "B", "2", "10.30", "0.50"] in [row[:5] for row in rows]
     assert "few-laboratories" not in said
 
 

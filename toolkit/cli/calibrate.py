@@ -38,7 +38,6 @@ def command(
     """
     from toolkit.calibration.control.calibrate import calibrate, rehearse
     from toolkit.calibration.records.use import UNSIGNED
-    from toolkit.lab.answers import refuse_unwritable
     from toolkit.lab.records.session_answer import (
         NOT_ENTERED,
         candidate_payload,
@@ -68,7 +67,6 @@ def command(
             next_step="leave out --figures, or enter the session; nothing was written",
             rule="usage",
         )
-    refuse_unwritable(figures)
     candidate = (rehearse if dry_run else calibrate)(
         session, registry, machine=machine, again=again, standards=standards_of(registry.folder.parent)
     )

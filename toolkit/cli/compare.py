@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -20,8 +21,6 @@ from toolkit.cli.options import (
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    from datetime import date
-
     from toolkit.comparison.model import Mode
     from toolkit.report.word.package import Template
 
@@ -95,10 +94,11 @@ def command(
     Example: toolkit compare tests/steel tests/sandpaper --figures figures
     """
     from toolkit.comparison.compare import compare
-    from toolkit.lab.answers import unit_choice
+    from toolkit.lab.answers import document_text, unit_choice
     from toolkit.lab.home import document_template
     from toolkit.lab.tire_tests.compare import read_entries, write_comparison
     from toolkit.lab.tire_tests.compare_answer import compare_answer, comparison_text
+    from toolkit.report.comparison.content import Compared
 
     if laboratories is not None:
         if sources:
@@ -128,15 +128,12 @@ def command(
         entries, mode=cast("Mode | None", mode), level=level, reproducibility=reproducibility
     )
     attention = [*findings, *comparison.findings]
+    compared = Compared(comparison=comparison, findings=attention, issued=day(known_at) or date.today())  # noqa: DTZ011
     drawn, document = write_comparison(
-        comparison, style, attention, figures=figures, opened=opened, out=out, known_at=day(known_at),
-        units=None if units is None else style,
-    )  # fmt: skip
+        compared, style, figures=figures, opened=opened, out=out, units=None if units is None else style
+    )
     payload = compare_answer(comparison, attention, drawn, document, output.timing)
-    text = comparison_text(comparison, style, attention, drawn)
-    if document is not None:
-        text += f"\n\n{document.pdf}\n{document.docx}\n{document.pages} pages, verified"
-        text += "".join(f"\n  warning {warning}" for warning in document.warnings)
+    text = f"{comparison_text(compared, style, drawn)}\n{document_text(payload['document'])}".rstrip("\n")
     output.answer(payload, text)
     return 1 if document is not None and document.warnings else exit_code(attention)
 
@@ -151,13 +148,11 @@ def _laboratories(
     known_at: date | None,
     output: Output,
 ) -> int:
-    from datetime import date as calendar
-
     from toolkit.lab.tire_tests.compare import laboratories_answer
 
     payload, text, findings = laboratories_answer(
         path, reference=reference, sigma=sigma, figures=figures, opened=opened, out=out,
-        issued=known_at or calendar.today(),  # noqa: DTZ011
+        issued=known_at or date.today(),  # noqa: DTZ011
     )  # fmt: skip
     output.answer(payload, text)
     warned = bool((payload["document"] or {}).get("warnings"))

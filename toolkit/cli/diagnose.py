@@ -51,6 +51,7 @@ def command(
     """
     _one_thread()
     from toolkit.declared import answer
+    from toolkit.lab.answers import document_text
     from toolkit.lab.home import home_template
     from toolkit.lab.studies.diagnosis import diagnose_case, diagnosis_text, write_diagnosis
     from toolkit.report.word.office import find_soffice
@@ -68,13 +69,8 @@ def command(
     )  # fmt: skip
     payload = write_diagnosis(diagnosed, out, timing=lambda: output.timing, opened=opened, by=by)
     text = diagnosis_text(diagnosed.result.diagnosis, out)
-    warned = False
-    if payload.document is not None:
-        document = payload.document
-        warned = bool(document["warnings"])
-        text += f"\n{document['pdf']}\n{document['docx']}\n{document['pages']} pages, verified"
-        text += "".join(f"\n  warning {warning}" for warning in document["warnings"])
-    output.answer(answer(payload), text)
+    warned = payload.document is not None and bool(payload.document["warnings"])
+    output.answer(answer(payload), text + document_text(payload.document))
     return 0 if diagnosed.result.diagnosis.verdict == "nothing" and not warned else 1
 
 

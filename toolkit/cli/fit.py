@@ -68,7 +68,7 @@ def command(
 
     Example: toolkit fit tire.csv --model magic_formula --model mf61 --model brush --figures figures
     """
-    from toolkit.lab.answers import counted, refuse_unwritable
+    from toolkit.lab.answers import counted
     from toolkit.lab.tire_tests.convert import check_fmu, write_fit_fmu
     from toolkit.lab.tire_tests.fit_answer import fit_payload, fit_text
     from toolkit.lab.tire_tests.fit_models import (
@@ -92,7 +92,6 @@ def command(
     modelled = check_fmu(fmu, source, names, fmi) if fmu is not None else None
     if into is not None or modelled is not None:
         check_side(side.upper())
-    refuse_unwritable(figures)
     if machine is not None:
         fitted = fit_recording(
             source, machine, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load,

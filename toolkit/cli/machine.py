@@ -102,13 +102,14 @@ def correct(
 
     from toolkit.diagnosis.answer.correction import correction_of, machine_of
     from toolkit.lab.answers import one_line
+    from toolkit.lab.starters import refuse_existing
     from toolkit.machine import load_machine
     from toolkit.machine.default import DEFAULT_MACHINE
     from toolkit.machine.definition import next_version
     from toolkit.publication import write_result
     from toolkit.simulation.model_file import read_model
 
-    _refuse_existing(out)
+    refuse_existing(out)
     machine = machine or DEFAULT_MACHINE
     corrected = load_machine(machine)
     model = read_model(source / "model.toml" if source.is_dir() else source)
@@ -120,17 +121,6 @@ def correct(
     payload = {"path": out} | _payload(definition)
     output.answer(payload, f"{_text(definition)}\nwritten to {one_line(out)}")
     return 0
-
-
-def _refuse_existing(out: Path) -> None:
-    from toolkit.errors import OutputError
-
-    if out.exists() or out.suffix != ".toml":
-        raise OutputError(
-            "a new version never replaces a definition" if out.exists() else "a definition is a .toml file",
-            where=out, got="a file that exists" if out.exists() else out.name,
-            expected="a new .toml file", next_step="choose another name with --out", rule="not-writable",
-        )  # fmt: skip
 
 
 def _payload(definition: Machine) -> dict[str, Any]:

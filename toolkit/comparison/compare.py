@@ -15,7 +15,7 @@ from toolkit.characteristics.shared_errors import identity_of
 from toolkit.comparison.differences import differences, pattern_effects
 from toolkit.comparison.model import MODES, Comparison, Entry, Mode, Repeats
 from toolkit.comparison.precision import repeats_of
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, refuse_unknown
 from toolkit.findings import Finding
 from toolkit.machine import Machine
 from toolkit.reduction.model import ReducedTest
@@ -148,11 +148,8 @@ def _check(entries: Sequence[Entry], mode: Mode | None, level: float) -> None:
             "the level is no probability", where="--level", got=level, expected="a number between 0 and 1",
             next_step="0.05 is usual", rule="wrong-value",
         )  # fmt: skip
-    if mode is not None and mode not in MODES:
-        raise ConfigError(
-            f"unknown mode {mode!r}", where="--mode", got=mode, expected=", ".join(MODES),
-            next_step="name one of those expected", rule="unknown-mode",
-        )  # fmt: skip
+    if mode is not None:
+        refuse_unknown("mode", mode, MODES, where="--mode", rule="unknown-mode")
     for identity, count in Counter(entry.identity for entry in entries).items():
         if count > 1:
             twice = [entry.source for entry in entries if entry.identity == identity]

@@ -5,17 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict, cast
 
 from toolkit.calibration.records.use import CalibrationUse, signature_of
 from toolkit.declared.answers import entry_of
-from toolkit.errors import ConfigError
+from toolkit.errors import refuse_unknown
 from toolkit.printable import escaped
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered
+    from toolkit.report.document import DeclaredTable
     from toolkit.report.style import Style
 
 
@@ -174,6 +177,17 @@ def table(
     return "\n".join(lines)
 
 
+def document_table(declared: DeclaredTable[Any], source: object, style: Style) -> str:
+    """Return a table of texts as a document has it, headed by its columns' names; empty without rows."""
+    rows = [list(map(str, row)) for row in cast("Iterable[Sequence[object]]", declared.build(source, style))]
+    align = "".join(">" if all(map(_is_number, column)) else "<" for column in zip(*rows, strict=True))
+    return table([column.name for column in declared.entry.columns], rows, align=align)
+
+
+def _is_number(text: str) -> bool:
+    return text[:1] in "+-−.0123456789"
+
+
 def _shortened(
     header: Sequence[str], rows: Sequence[Sequence[str]], align: str, width: int, whole: Sequence[int]
 ) -> list[Sequence[str]]:
@@ -263,6 +277,18 @@ def delivered_keys(delivered: Delivered) -> DeliveredDocument:
     return entry_of(DeliveredDocument, delivered, verified=True, figures=figures)
 
 
+def document_text(document: DeliveredDocument | None) -> str:
+    """Return what people read of a delivered document, below the rest of an answer; empty without one."""
+    if document is None:
+        return ""
+    lines = [
+        "",
+        *(one_line(document[kind]) for kind in ("pdf", "docx")),
+        f"{document['pages']} pages, verified",
+    ]
+    return "\n".join([*lines, *(f"  warning {warning}" for warning in document["warnings"])])
+
+
 def file_name(text: str, *, otherwise: str) -> str:
     """Return the name of a test, or the id of a certificate, as a file's name.
 
@@ -283,37 +309,5 @@ def unit_choice(units: str) -> Style:
     from toolkit.report.style import Style
 
     choices = {"SI": Style(), "lbf": Style(force="lbf", moment="lbf*ft")}
-    if units not in choices:
-        raise ConfigError(
-            f"unknown units {units!r}", where="--units", got=units, expected=", ".join(choices),
-            next_step="name one of those expected", rule="unknown-units",
-        )  # fmt: skip
+    refuse_unknown("units", units, choices, where="--units", rule="unknown-units")
     return choices[units]
-
-
-def refuse_unwritable(folder: Path | None) -> None:
-    """Refuse a folder for figures that cannot be written, before anything is.
-
-    Raises
-    ------
-    OutputError
-        ``not-writable``
-    """
-    import os
-
-    from toolkit.errors import OutputError
-
-    if folder is None:
-        return
-    near = folder
-    while not near.exists() and near != near.parent:
-        near = near.parent
-    if not near.is_dir() or not os.access(near, os.W_OK | os.X_OK):
-        raise OutputError(
-            "the figures cannot be written",
-            where=folder,
-            got=f"{near} is {'not writable' if near.is_dir() else 'no folder'}",
-            expected="a folder with write permission",
-            next_step="choose another folder with --figures; nothing was written",
-            rule="not-writable",
-        )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.errors import FitError
+from toolkit.errors import FitError, refuse_unknown
 from toolkit.estimate import Estimate
 from toolkit.tires.colour import noise_of
 from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
@@ -65,11 +65,7 @@ def fit_curves(curves: Sequence[Curve], *, loss: Loss = "linear") -> tuple[Curve
     FitError
         fewer than seven rows or slip angles, a constant column, NaN or infinity, an unknown loss
     """
-    if loss not in LOSSES:
-        raise FitError(
-            f"unknown loss {loss!r}", where="--loss", got=loss, expected=", ".join(LOSSES),
-            next_step="name one of those expected", rule="unknown-loss",
-        )  # fmt: skip
+    refuse_unknown("loss", loss, LOSSES, where="--loss", rule="unknown-loss", error=FitError)
     for curve in curves:
         if (problem := why_not(curve)) is not None:
             raise problem

@@ -12,7 +12,7 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.channels import signs
-from toolkit.errors import FitError
+from toolkit.errors import FitError, refuse_unknown
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.reduction.selection import Selection, of_one_condition
@@ -223,11 +223,7 @@ def fit_global(
         what `why_not_global` says, an unknown loss or weighting
     """
     for name, choice, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        if choice not in choices:
-            raise FitError(
-                f"unknown {name} {choice!r}", where=f"--{name}", got=choice, expected=", ".join(choices),
-                next_step="name one of those expected", rule=f"unknown-{name}",
-            )  # fmt: skip
+        refuse_unknown(name, choice, choices, where=f"--{name}", rule=f"unknown-{name}", error=FitError)
     selection = selection_of(data, model)
     data = data.take(selection.rows)
     if (problem := why_not_global(data, model)) is not None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.channels import AXES, Axes
-from toolkit.errors import ConfigError, FitError
+from toolkit.errors import FitError, refuse_unknown
 from toolkit.tires.field_file import FieldFile, read_field_file
 from toolkit.tires.plausibility import load_of
 from toolkit.tires.table import TireTable
@@ -108,11 +108,8 @@ def split_file(path: Path, axes: str | None = None) -> Sweeps:
     ConfigError
         ``unknown-axes``
     """
-    if axes is not None and axes not in AXES:
-        raise ConfigError(
-            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
-            next_step="name one of those expected", rule="unknown-axes",
-        )  # fmt: skip
+    if axes is not None:
+        refuse_unknown("axis system", axes, AXES, where="--axes", rule="unknown-axes")
     return split(
         read_field_file(path), axes=next((system for system in get_args(Axes) if system == axes), None)
     )

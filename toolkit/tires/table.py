@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from toolkit.arrays import Array
 from toolkit.channels import AXES, CHANNELS, Axes, channel_of
 from toolkit.declared import nearest
-from toolkit.errors import CellError, ColumnError, ConfigError, UnreadableError
+from toolkit.errors import CellError, ColumnError, UnreadableError, refuse_unknown
 from toolkit.findings import Finding
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import Line, pointed, read_lines
@@ -111,7 +111,7 @@ def read_table(
         text, an empty cell, NaN or infinity in a number's place, a value that no tire can have, loads of
         both signs
     """
-    _demand_axes(axes)
+    refuse_unknown("axis system", axes, AXES, where="--axes", rule="unknown-axes")
     lines, marks = _without_marks(_cells(path))
     row, header = lines[0]
     _demand_columns(header, path, required=required, measured=measured)
@@ -153,7 +153,7 @@ def table_of(
     ToolkitError
         as `read_table`, but for what a file's cells may hold
     """
-    _demand_axes(axes)
+    refuse_unknown("axis system", axes, AXES, where="--axes", rule="unknown-axes")
     names = _demand_columns(header, path, required=required, measured=measured)
     numbered = list(rows) if rows is not None else list(range(1, len(values[0]) + 1))
     if not numbered:
@@ -176,14 +176,6 @@ def table_of(
         cells=cells,
         marks=marks,
     )
-
-
-def _demand_axes(axes: str) -> None:
-    if axes not in AXES:
-        raise ConfigError(
-            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
-            next_step="name one of those expected", rule="unknown-axes",
-        )  # fmt: skip
 
 
 def _demand_columns(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolkit.arrays import Array
-from toolkit.errors import ConfigError, FitError
+from toolkit.errors import FitError, refuse_unknown
 from toolkit.findings import Finding
 from toolkit.reduction.limits import FRICTION, LARGEST_TRAIL_M, LEAST_LOAD_N
 from toolkit.tires.mf import Forces
@@ -60,11 +60,7 @@ def evaluate_tir(
     FitError
         the result is not finite
     """
-    if angles not in ANGLES:
-        raise ConfigError(
-            f"unknown kind of angles {angles!r}", where="--angles", got=angles, expected=", ".join(ANGLES),
-            next_step="name one of those expected", rule="unknown-angles",
-        )  # fmt: skip
+    refuse_unknown("kind of angles", angles, ANGLES, where="--angles", rule="unknown-angles")
     version = tir.version
     p = tir.coefficients()
     FNOMIN, radius = demanded(tir, "FNOMIN"), demanded(tir, "UNLOADED_RADIUS")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, refuse_unknown
 from toolkit.findings import Finding
 from toolkit.publication import write_result
 from toolkit.tires.global_data import Measured
@@ -59,11 +59,7 @@ def check_side(side: str) -> None:
     ConfigError
         ``unknown-side``
     """
-    if side not in SIDES:
-        raise ConfigError(
-            f"unknown side of the tire {side!r}", where="--side", got=side, expected=", ".join(SIDES),
-            next_step="name one of those expected", rule="unknown-side",
-        )  # fmt: skip
+    refuse_unknown("side of the tire", side, SIDES, where="--side", rule="unknown-side")
 
 
 def tire_fit(model: GlobalModel, fit: ModelFit, data: Measured, *, side: str = "UNKNOWN") -> TireFit:

@@ -17,7 +17,7 @@ from toolkit.comparison.model import Comparison, Entry
 from toolkit.estimate import Estimate
 from toolkit.findings import Finding
 from toolkit.report.comparison.cells import conclusion, named, p_text, shown_rows, with_U
-from toolkit.report.comparison.content import COMPARISON, build_comparison_content, comparison_plots
+from toolkit.report.comparison.content import COMPARISON, Compared, build_comparison_content, comparison_plots
 from toolkit.report.style import Style
 
 CHECKOUT = Path(__file__).resolve().parents[3]
@@ -55,7 +55,8 @@ def pair(**more: Any) -> Comparison:
 
 
 def content(found: Comparison, style: Style | None = None, findings: tuple[Finding, ...] = ()) -> Any:
-    return build_comparison_content(found, style or Style(), findings, issued=dt.date(2026, 1, 3))
+    compared = Compared(comparison=found, findings=findings, issued=dt.date(2026, 1, 3))
+    return build_comparison_content(compared, style or Style())
 
 
 def test_every_table_has_the_columns_of_its_vocabulary() -> None:
@@ -103,7 +104,8 @@ def test_marks_follow_the_tests() -> None:
 
 def test_the_same_comparison_has_the_same_id_on_any_day() -> None:
     one = content(pair())
-    other = build_comparison_content(pair(), Style(), (), issued=dt.date(2027, 7, 7))
+    compared = Compared(comparison=pair(), findings=(), issued=dt.date(2027, 7, 7))
+    other = build_comparison_content(compared, Style())
     assert one.identity == other.identity
     assert one.identity != content(compare([entry("second & <b>", 30.0), entry("first", 0.0)])).identity
 

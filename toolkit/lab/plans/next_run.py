@@ -15,6 +15,7 @@ from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.findings import FindingEntry
+from toolkit.lab.answers import document_text, table
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
@@ -84,7 +85,7 @@ def plan_next(
     from toolkit.diagnosis.fit.problem import problem_of
     from toolkit.diagnosis.simulators.build_simulator import model_of
     from toolkit.diagnosis.simulators.case_code import running
-    from toolkit.lab.plans.plan_sheets import next_sheet, sheet_text, write_plan
+    from toolkit.lab.plans.plan_sheets import next_sheet, write_plan
     from toolkit.lab.studies.diagnosis import machine_registry
     from toolkit.planning.members import class_of, members_of
     from toolkit.planning.next_run import RunSearch
@@ -136,7 +137,7 @@ def plan_next(
         written = write_plan(files, out, sheet, template, answer)
         answer = dataclasses.replace(answer, document=written, files=tuple(files))
     text = plan_text(plan, answer.files, model=file.parent / "model.toml", out=out)
-    return answer, text + sheet_text(answer.document)
+    return answer, text + document_text(answer.document)
 
 
 def _case_of(file: Path) -> Path:
@@ -323,7 +324,6 @@ def plan_text(plan: NextRunPlan, files: Sequence[str], *, model: Path, out: Path
 
     ``model`` is the answer's model file, which simulates the run; ``out`` the folder of the files.
     """
-    from toolkit.lab.answers import table
 
     rows = [
         [pair.true, pair.other, f"{pair.recorded:+.1f}", f"{pair.repeat:.1f}", f"{pair.expected:.1f}"]

@@ -12,7 +12,7 @@ from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import findings_text, table
+from toolkit.lab.answers import document_text, findings_text, table
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.interval import IntervalPlan
 
@@ -62,7 +62,7 @@ def interval_plan_answer(
     """
     from toolkit.calibration.control.chart import control_chart
     from toolkit.calibration.control.recall import due_of
-    from toolkit.lab.plans.plan_sheets import interval_sheet, sheet_text, write_plan
+    from toolkit.lab.plans.plan_sheets import interval_sheet, write_plan
     from toolkit.planning.interval import ASSUMPTIONS, paths_of, plan_interval
 
     if not LEAST <= reliability < 1:
@@ -88,7 +88,7 @@ def interval_plan_answer(
     if out is not None:
         sheet = interval_sheet(plan, instrument, due.record, findings, registry.today())
         answer = dataclasses.replace(answer, document=write_plan({}, out, sheet, template, answer))
-    return answer, _text(answer, findings) + sheet_text(answer.document), findings
+    return answer, _text(answer, findings) + document_text(answer.document), findings
 
 
 def _infeasible(plan: IntervalPlan) -> ConfigError:

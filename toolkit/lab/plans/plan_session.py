@@ -15,7 +15,7 @@ from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import reads_as_number
-from toolkit.lab.answers import findings_text, one_line, table
+from toolkit.lab.answers import document_text, findings_text, one_line, table
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.planning.session_plan import PlannedLoad, SessionPlan
 
@@ -90,7 +90,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[PlanSessi
     ToolkitError
         nothing applies, fixtures or demands cannot be used, no plan keeps them; nothing is written
     """
-    from toolkit.lab.plans.plan_sheets import session_sheet, sheet_text, write_plan
+    from toolkit.lab.plans.plan_sheets import session_sheet, write_plan
     from toolkit.planning.knowledge import Knowledge
     from toolkit.planning.session_plan import plan_session
     from toolkit.planning.session_search import Demand
@@ -120,7 +120,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[PlanSessi
         paths = tuple(str(order.out / name) for name in files)
         answer = dataclasses.replace(answer, document=written, files=paths)
         people += "\n\n" + "\n".join(f"written: {one_line(path)}" for path in paths)
-        people += sheet_text(written)
+        people += document_text(written)
     return answer, people, list(plan.findings)
 
 

@@ -75,14 +75,6 @@ def write_plan(
         return delivered_keys(deliver(template, content, out, name=DOCUMENT, stage=stage))
 
 
-def sheet_text(document: DeliveredDocument | None) -> str:
-    """Return what people are told of a delivered sheet; nothing where there is none."""
-    if document is None:
-        return ""
-    lines = ["", f"written: {document['docx']}", f"written: {document['pdf']}"]
-    return "\n".join([*lines, *(f"  warning {warning}" for warning in document["warnings"])])
-
-
 def operator_steps(plan: SessionPlan) -> Iterator[tuple[str, str, PlannedLoad | None]]:
     """Yield the operator's steps of a session: run, what to do, and the load that is then on."""
     run, mount = 0, ""

@@ -16,6 +16,7 @@ from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
+from toolkit.lab.answers import document_text, table
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
 from toolkit.planning.demands import Demand, PrintedUnits, load_of, nominal_loads
@@ -83,7 +84,7 @@ def plan_test(
     """
     from datetime import date
 
-    from toolkit.lab.plans.plan_sheets import protocol_sheet, sheet_text, write_plan
+    from toolkit.lab.plans.plan_sheets import protocol_sheet, write_plan
     from toolkit.planning.demands import parse_demand, units_of
     from toolkit.planning.protocol_plan import plan_protocol
     from toolkit.planning.protocol_search import shared_loads
@@ -117,7 +118,7 @@ def plan_test(
         sheet = protocol_sheet(plan, date.today(), units)  # noqa: DTZ011
         written = write_plan(_files(plan, own, tire, out), out, sheet, template, answer)
         answer = dataclasses.replace(answer, document=written)
-    return answer, plan_text(plan, answer.files, units) + sheet_text(answer.document)
+    return answer, plan_text(plan, answer.files, units) + document_text(answer.document)
 
 
 def _refuse_doubled(labels: Sequence[str], where: str, what: str) -> None:
@@ -384,7 +385,6 @@ def _sweeps(plan: ProtocolPlan, units: PrintedUnits) -> list[str]:
 def plan_text(plan: ProtocolPlan, files: Mapping[str, str], units: PrintedUnits) -> str:
     """Return a plan for people: what to measure, what it reaches, what it rests on and gives up."""
     from toolkit.estimate import plus_minus, round_uncertainty
-    from toolkit.lab.answers import table
     from toolkit.planning.demands import title_of
 
     own, design, several = plan.protocol, plan.plan, len(plan.tires) > 1

@@ -10,7 +10,7 @@ from toolkit.declared.answers import entry_of
 from toolkit.errors import SessionError, ToolkitError
 from toolkit.estimate import round_uncertainty
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import counted, finding_lines, refuse_unwritable, table
+from toolkit.lab.answers import counted, finding_lines, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -169,7 +169,6 @@ def record_report(
 
     record = registry.load(record_id)
     fit = fit_session(stored_session(registry.folder, record))
-    refuse_unwritable(figures)
     findings = session_findings(fit)
     report = fit_report(fit, record, full=True, figures=figures)
     text = f"{record.id}  {record.instrument}, session of {record.date}\nsha256 {record.sha256}{report.text}"

@@ -121,8 +121,9 @@ def worker_limits(
 def check_folder(out: Path, model: Path | None) -> None:
     """Refuse a folder that cannot be written, or whose model file is the one that was started from."""
     from toolkit.diagnosis.answer.model_text import MODEL
+    from toolkit.publication import check_place
 
-    _writable(out)
+    check_place(out)
     _apart(model, out / MODEL)
 
 
@@ -220,26 +221,6 @@ def _write_model(path: Path, text: str | None, stage: Path) -> None:
         (stage / path.name).write_text(text, encoding="utf-8")
     elif path.is_file() and is_model(read_toml(path)):
         supersede(stage, path.name)
-
-
-def _writable(out: Path) -> None:
-    """Refuse a folder that cannot be written before the search, not after it."""
-    import os
-
-    from toolkit.errors import OutputError
-
-    folder = out.absolute()
-    while not folder.exists() and folder != folder.parent:
-        folder = folder.parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(
-            "the answer's folder cannot be written",
-            where=out,
-            got="a file" if folder.is_file() else f"no write permission in {folder}",
-            expected="a folder, or a place where one can be made",
-            next_step="choose another folder with --out",
-            rule="not-writable",
-        )
 
 
 def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:

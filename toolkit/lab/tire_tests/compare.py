@@ -12,31 +12,31 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
-from toolkit.lab.answers import Timing, findings_text, one_line, refuse_unwritable, table
+from toolkit.lab.answers import Timing, document_table, document_text, findings_text, one_line
 
 if TYPE_CHECKING:
     from datetime import date
     from pathlib import Path
 
-    from toolkit.comparison.laboratories import LaboratoryComparison, Measurand, Score
+    from toolkit.comparison.laboratories import LaboratoryComparison, Measurand
     from toolkit.comparison.model import Comparison, Entry
     from toolkit.findings import Finding
     from toolkit.lab.tire_tests.compare_answer import LaboratoryKeys
     from toolkit.lab.tire_tests.resolve import Basis
+    from toolkit.report.comparison.content import Compared
     from toolkit.report.deliver import Delivered
+    from toolkit.report.laboratories.content import ComparedLaboratories
     from toolkit.report.style import Style
     from toolkit.report.word.package import Template
 
 
 def write_comparison(
-    comparison: Comparison,
+    compared: Compared,
     style: Style,
-    findings: Sequence[Finding],
     *,
     figures: Path | None,
     opened: Template | None,
     out: Path | None,
-    known_at: date | None,
     units: Style | None,
 ) -> tuple[dict[str, Path], Delivered | None]:
     """Write the figures and deliver the document, what is asked for of both; return them.
@@ -48,24 +48,16 @@ def write_comparison(
     with ExitStack() as together:
         drawn = {}
         if figures is not None:
-            drawn = _write_figures(comparison, style, together.enter_context(publication(figures)), figures)
+            drawn = _write_figures(
+                compared.comparison, style, together.enter_context(publication(figures)), figures
+            )
         if opened is None or out is None:
             return drawn, None
         stage = together.enter_context(publication(out))
-        return drawn, _deliver(comparison, opened, out, stage, findings, known_at, units)
+        return drawn, _deliver(compared, opened, out, stage, units)
 
 
-def _deliver(
-    comparison: Comparison,
-    opened: Template,
-    out: Path,
-    stage: Path,
-    findings: Sequence[Finding],
-    known_at: date | None,
-    units: Style | None,
-) -> Delivered:
-    from datetime import date
-
+def _deliver(compared: Compared, opened: Template, out: Path, stage: Path, units: Style | None) -> Delivered:
     from toolkit.report.comparison.content import build_comparison_content
     from toolkit.report.deliver import deliver
     from toolkit.report.style import read_style, style_file
@@ -73,8 +65,7 @@ def _deliver(
     style = read_style(style_file(opened.path))
     if units is not None:
         style = style.in_units_of(units)
-    content = build_comparison_content(comparison, style, findings, issued=known_at or date.today())  # noqa: DTZ011
-    return deliver(opened, content, out, name="comparison", stage=stage)
+    return deliver(opened, build_comparison_content(compared, style), out, name="comparison", stage=stage)
 
 
 def read_entries(
@@ -180,11 +171,12 @@ def laboratories_answer(
     from toolkit.comparison.laboratories import compare_laboratories
     from toolkit.comparison.laboratory_file import read_laboratories
     from toolkit.declared import answer
+    from toolkit.files import sha256_file
     from toolkit.lab.tire_tests.compare_answer import written_keys
+    from toolkit.report.laboratories import content
+    from toolkit.report.style import Style
 
     started = time.perf_counter()
-    for folder in (figures, out):
-        refuse_unwritable(folder)
     if sigma is not None and not (math.isfinite(sigma) and sigma > 0):
         raise ConfigError(
             "sigma_pt cannot be used", where="--sigma", got=sigma, expected="a finite number above 0",
@@ -192,26 +184,25 @@ def laboratories_answer(
         )  # fmt: skip
     reported, unit = read_laboratories(path)
     comparison = compare_laboratories(reported, unit=unit, reference=reference, sigma=sigma)
+    compared = content.ComparedLaboratories(
+        comparison=comparison, source=path.name, sha256=sha256_file(path), issued=issued
+    )
     with ExitStack() as together:
         drawn = {} if figures is None else _figures(comparison, figures, together)
         document = None
         if opened is not None and out is not None:
-            document = _document(comparison, path, opened, out, issued, together)
+            document = _document(compared, opened, out, together)
     timing: Timing = {"seconds": time.perf_counter() - started}
     keys: LaboratoryKeys = {
         "mode": "laboratories", "source": str(path), **written_keys(drawn, document, timing),
     }  # fmt: skip
-    lines = [line for measurand in comparison.measurands for line in _lines(measurand)]
+    tables = (content.assigned, content.scores, content.consistency)
+    texts = (document_table(declared, compared, Style()) for declared in tables)
+    lines = [f"{text}\n" for text in texts if text]
+    lines += [line for measurand in comparison.measurands for line in _precision_lines(measurand)]
     lines += [f"written: {one_line(file)}" for file in drawn.values()]
-    if document is not None:
-        lines += [f"written: {one_line(file)}" for file in (document.docx, document.pdf)]
-        lines += [f"{document.pages} pages, verified", *(f"  warning {text}" for text in document.warnings)]
-    shown = findings_text(comparison.findings)
-    return (
-        answer(comparison) | keys,
-        "\n".join([*lines, *([shown] if shown else [])]),
-        list(comparison.findings),
-    )
+    lines += [text for text in (document_text(keys["document"]), findings_text(comparison.findings)) if text]
+    return answer(comparison) | keys, "\n".join(lines), list(comparison.findings)
 
 
 def _figures(comparison: LaboratoryComparison, folder: Path, together: ExitStack) -> dict[str, Path]:
@@ -226,57 +217,15 @@ def _figures(comparison: LaboratoryComparison, folder: Path, together: ExitStack
     return {name: folder / f"{name}.png" for name in plots}
 
 
-def _document(
-    comparison: LaboratoryComparison,
-    source: Path,
-    opened: Template,
-    out: Path,
-    issued: date,
-    together: ExitStack,
-) -> Delivered:
-    from toolkit.files import sha256_file
+def _document(compared: ComparedLaboratories, opened: Template, out: Path, together: ExitStack) -> Delivered:
     from toolkit.publication import publication
     from toolkit.report.deliver import deliver
-    from toolkit.report.laboratories.content import ComparedLaboratories, build_laboratories_content
+    from toolkit.report.laboratories.content import build_laboratories_content
     from toolkit.report.style import read_style, style_file
 
-    compared = ComparedLaboratories(
-        comparison=comparison, source=source.name, sha256=sha256_file(source), issued=issued
-    )
     content = build_laboratories_content(compared, read_style(style_file(opened.path)))
     stage = together.enter_context(publication(out))
     return deliver(opened, content, out, name=DOCUMENT, stage=stage)
-
-
-def _lines(measurand: Measurand) -> list[str]:
-    from toolkit.estimate import plus_minus
-
-    unit, sigma = measurand.unit, measurand.sigma_pt
-    told = "" if sigma is None else f" = {sigma:.4g}"
-    return [
-        f"{measurand.name}: {measurand.assigned:.6g} {unit}, u = {measurand.u_assigned:.3g}, "
-        f"{measurand.assigned_by}; sigma_pt{told}, {measurand.sigma_by}",
-        "",
-        table(
-            ["laboratory", "n", f"mean [{unit}]", "z'", "zeta", "E_n", "h", "k", ""],
-            [
-                [score.laboratory, str(score.n),
-                 f"{score.mean:.6g}" if score.U is None else plus_minus(score.mean, score.U),
-                 _ratio(score.z_prime), _ratio(score.zeta), _ratio(score.En), _ratio(score.h),
-                 _ratio(score.k), _signals(score)]
-                for score in measurand.scores
-            ],
-            align="<>>>>>>><",
-        ),
-        "",
-        *_precision_lines(measurand),
-    ]  # fmt: skip
-
-
-def _signals(score: Score) -> str:
-    departures = (("h", score.h_departure), ("k", score.k_departure))
-    shown = [score.signal, "E_n" if score.En_signal else None]
-    return ", ".join(filter(None, [*shown, *(f"{by}: {name}" for by, name in departures if name)]))
 
 
 def _precision_lines(measurand: Measurand) -> list[str]:
@@ -289,11 +238,7 @@ def _precision_lines(measurand: Measurand) -> list[str]:
         else f"s_r = {p.s_r.value:.4g} ({p.s_r.low:.4g} to {p.s_r.high:.4g}), r = {p.r:.4g}"
     )
     return [
-        f"ISO 5725-2, {p.laboratories} laboratories, {p.n} results, mean {p.mean:.6g} {measurand.unit}: "
-        f"{within}, s_R = {p.s_R:.4g}, R = {p.R:.4g}",
+        f"{measurand.name} by ISO 5725-2, {p.laboratories} laboratories, {p.n} results, "
+        f"mean {p.mean:.6g} {measurand.unit}: {within}, s_R = {p.s_R:.4g}, R = {p.R:.4g}",
         "",
     ]
-
-
-def _ratio(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"

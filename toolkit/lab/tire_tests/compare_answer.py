@@ -17,6 +17,7 @@ from toolkit.lab.answers import (
     Timed,
     Timing,
     delivered_keys,
+    document_table,
     draft_keys,
     estimate_keys,
     finding_lines,
@@ -27,6 +28,7 @@ from toolkit.lab.answers import (
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, Precision, Repeats
+    from toolkit.report.comparison.content import Compared
     from toolkit.report.deliver import Delivered
     from toolkit.report.style import Style
 
@@ -249,30 +251,26 @@ def _precision_entry(precision: Precision) -> PrecisionEntry:
     )  # fmt: skip
 
 
-def comparison_text(
-    comparison: Comparison, style: Style, findings: Sequence[Finding], drawn: Mapping[str, Path]
-) -> str:
-    """Return a comparison for people."""
+def comparison_text(compared: Compared, style: Style, drawn: Mapping[str, Path]) -> str:
+    """Return a comparison for people, with the tables of its document."""
     from toolkit.comparison.model import SECTIONS
+    from toolkit.report.comparison import content
     from toolkit.report.comparison.cells import conclusion, shown_rows
 
+    comparison, findings = compared.comparison, compared.findings
     simulated = "  SIMULATED" if any(entry.simulated for entry in comparison.entries) else ""
     marks = simulated + mark_words(*comparison.uses)
     parts = [f"comparison of {comparison.mode}, reference {comparison.reference.label}{marks}"]
     parts += [signature_words(*comparison.uses), _conditions(comparison), conclusion(comparison)]
+    tables = {"characteristics": content.differences, "curves": content.curve_differences}
     for part in SECTIONS:
-        rows, which = shown_rows(comparison, part)
         if any(difference.part == part for difference in comparison.differences):
-            parts.append(f"{part}: {which}; * marks what is significant")
-            parts.append(_table(rows, style))
+            parts.append(f"{part}: {shown_rows(comparison, part)[1]}; * marks what is significant")
+            parts.append(document_table(tables[part], compared, style))
+    parts += [document_table(declared, compared, style) for declared in (content.factors, content.precision)]
     if comparison.repeats is not None:
-        parts += [
-            _factors(comparison),
-            _precision(comparison, style),
-            comparison.repeats.reproducibility_note,
-        ]
-    if comparison.pattern:
-        parts.append(_pattern(comparison, style))
+        parts.append(comparison.repeats.reproducibility_note)
+    parts.append(document_table(content.pattern, compared, style))
     if comparison.left_out:
         parts.append("\n".join(f"not compared: {reason}" for reason in comparison.left_out))
     if drawn:
@@ -299,83 +297,3 @@ def _conditions(comparison: Comparison) -> str:
     return "\n".join(
         line for line in (head, "the same in all:" if shared else "", *(f"  {s}" for s in shared)) if line
     )
-
-
-def _table(rows: Sequence[Difference], style: Style) -> str:
-    from toolkit.report.comparison.cells import named, p_text, shown_unit, with_U
-
-    load_unit, load_factor = style.unit("N")
-    cells = []
-    for row in rows:
-        unit, factor = shown_unit(row.name, style)
-        cells.append(
-            [
-                named(row.name, row.rotation, row.SA_rad),
-                f"{row.load_N * load_factor:.0f}",
-                unit,
-                with_U(row.reference, factor, style),
-                row.label,
-                with_U(row.other, factor, style),
-                with_U(row.difference, factor, style),
-                p_text(row.p_holm, style),
-                "*" if row.significant else "",
-            ]
-        )
-    head = ["quantity", f"FZ [{load_unit}]", "unit", "reference", "other", "value", "difference", "p (Holm)"]
-    return table([*head, ""], cells, align="<><><>>><")
-
-
-def _factors(comparison: Comparison) -> str:
-    assert comparison.repeats is not None  # noqa: S101  asked before
-    rows = [
-        [factor.name, ", ".join(str(level or "-") for level in factor.levels), factor.note or "told apart"]
-        for factor in comparison.repeats.factors
-    ]
-    return table(["factor", "in the tests", ""], rows, align="<<<")
-
-
-def _precision(comparison: Comparison, style: Style) -> str:
-    assert comparison.repeats is not None  # noqa: S101  asked before
-    load_unit, load_factor = style.unit("N")
-    from toolkit.report.comparison.cells import factor_text, named, shown_unit
-
-    names = [factor.name for factor in comparison.repeats.factors if factor.varied]
-    rows = []
-    for precision in comparison.repeats.precisions:
-        unit, factor = shown_unit(precision.name, style)
-        rows.append(
-            [
-                named(precision.name, precision.rotation),
-                f"{precision.load_N * load_factor:.0f}",
-                unit,
-                str(precision.n),
-                f"{precision.mean * factor:.4g}",
-                f"{precision.total.value * factor:.3g}",
-                "-" if precision.repeatability is None else f"{precision.repeatability.value * factor:.3g}",
-                "-" if precision.limit_r is None else f"{precision.limit_r * factor:.3g}",
-                *(
-                    factor_text(next(f for f in precision.factors if f.factor == name), factor, style)
-                    for name in names
-                ),
-            ]
-        )
-    head = ["quantity", f"FZ [{load_unit}]", "unit", "n", "mean", "s", "s_r", "limit r"]
-    return table([*head, *(f"s_I({name})" for name in names)], rows, align="<><>" + ">" * (4 + len(names)))
-
-
-def _pattern(comparison: Comparison, style: Style) -> str:
-    from toolkit.report.comparison.cells import shown_unit, with_U
-
-    load_unit, load_factor = style.unit("N")
-    rows = []
-    for effect in comparison.pattern:
-        unit, factor = shown_unit(effect.name, style)
-        rows.append(
-            [effect.name, f"{effect.load_N * load_factor:.0f}", unit]
-            + [
-                with_U(e, factor, style)
-                for e in (effect.regular, effect.reversed, effect.pattern, effect.body)
-            ]
-        )
-    head = ["pattern effect", f"FZ [{load_unit}]", "unit", "regular belt", "reversed belt", "pattern", "body"]
-    return table(head, rows, align="<><>>>>")

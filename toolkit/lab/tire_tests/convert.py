@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.errors import ConfigError, FitError
+from toolkit.errors import ConfigError, FitError, refuse_unknown
 from toolkit.files import same_file
 from toolkit.findings import Finding
 
@@ -72,14 +72,9 @@ def convert(
         there is no such conversion; the source cannot be read; a table of a draft is asked for
     """
     from toolkit.channels import AXES
-    from toolkit.errors import ConfigError
     from toolkit.publication import write_result
 
-    if axes not in AXES:
-        raise ConfigError(
-            f"unknown axis system {axes!r}", where="--axes", got=axes, expected=", ".join(AXES),
-            next_step="name one of those expected", rule="unknown-axes",
-        )  # fmt: skip
+    refuse_unknown("axis system", axes, AXES, where="--axes", rule="unknown-axes")
     kinds = _kinds(source, target)
     use: CalibrationUse | None = None
     text: str | bytes

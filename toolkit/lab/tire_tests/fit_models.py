@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from toolkit.errors import ConfigError, FitError
+from toolkit.errors import ConfigError, FitError, refuse_unknown
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -388,11 +388,7 @@ def fit_options(loss: str, weights: str, rated_load: float | None, radius: float
     from toolkit.tires.model import LOSSES
 
     for name, choice, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        if choice not in choices:
-            raise ConfigError(
-                f"unknown {name} {choice!r}", where=f"--{name}", got=choice, expected=", ".join(choices),
-                next_step="name one of those expected", rule=f"unknown-{name}",
-            )  # fmt: skip
+        refuse_unknown(name, choice, choices, where=f"--{name}", rule=f"unknown-{name}")
     for option, value, unit in (("--rated-load", rated_load, "N"), ("--radius", radius, "m")):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ConfigError(

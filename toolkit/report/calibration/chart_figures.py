@@ -170,8 +170,6 @@ def write_figure(path: Path, budget: Budget, over_range: Sequence[Budget]) -> Pa
         )  # fmt: skip
     from matplotlib.figure import Figure
 
-    from toolkit.report.calibration.chart_figures import whole_ticks
-
     drawing = Figure(figsize=(8.0, 3.6), layout="constrained")
     left, right = drawing.subplots(1, 2, width_ratios=(1.15, 1.0))
     parts = sorted(

@@ -94,19 +94,16 @@ COMPARISON: Document[Compared] = Document(
 )
 
 
-def build_comparison_content(
-    comparison: Comparison, style: Style, findings: Sequence[Finding], *, issued: dt.date
-) -> ReportContent:
+def build_comparison_content(source: Compared, style: Style) -> ReportContent:
     """Return everything that a template of a comparison can ask for."""
-    source = Compared(comparison=comparison, findings=findings, issued=issued)
     return COMPARISON.content(
         source,
         style,
-        calibrations=comparison.uses,
+        calibrations=source.comparison.uses,
         title=source.title,
         identity=source.id,
         subject="Comparison of tire force and moment tests",
-        issued=issued,
+        issued=source.issued,
     )
 
 
