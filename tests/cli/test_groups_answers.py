@@ -187,3 +187,14 @@ def test_every_document_of_json_has_its_schema(capsys: pytest.CaptureFixture[str
         document = json.loads(capsys.readouterr().out)
         assert (caught.value.code, document["schema"]) == (0, 1)
     assert document == {"schema": 1, "version": __version__}
+
+
+def test_every_option_of_one_value_is_refused_where_it_is_given_twice() -> None:
+    """The parser takes the last one: a day or a template that was stated first would be lost unseen."""
+    for words, command in leaves(command_tree()):
+        for option in command.params:
+            if option.param_type_name != "option" or option.is_flag or option.multiple:
+                continue
+            with pytest.raises(typer.BadParameter) as refusal:
+                command.make_context(words, [option.opts[0], "1", option.opts[0], "2"])
+            assert refusal.value.message == "one value, given once", (words, option.opts)

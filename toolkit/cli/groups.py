@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import partial
 from typing import Any
 
-from typer import Typer
+from typer import BadParameter, Typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command_from_info, get_command_name, get_group_from_info
 from typer.models import CommandInfo, TyperInfo
@@ -27,6 +27,19 @@ class Group(TyperGroup):
         commands: Any = self.commands
         titles: Any = {name: TyperCommand(name, help=text) for name, text in commands.titles.items()}
         TyperGroup(commands=titles, rich_markup_mode=None).format_commands(ctx, formatter)
+
+
+class SaidOnce(TyperCommand):
+    """A command that refuses an option of one value that is given twice: the first would be lost unseen."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the options and arguments of a call."""
+        given: list[Any] = self.make_parser(ctx).parse_args(args=list(args))[2]
+        for option in dict.fromkeys(given):
+            is_one_value = option.param_type_name == "option" and not option.multiple and not option.is_flag
+            if is_one_value and given.count(option) > 1:
+                raise BadParameter("one value, given once", ctx=ctx, param=option)
+        return super().parse_args(ctx, args)
 
 
 class Commands(MutableMapping[str, Any]):
@@ -118,6 +131,8 @@ def schema_text(command: str, declared: Mapping[str, Any]) -> str:
 
 
 def _command(info: CommandInfo, finish: Finish) -> Any:
+    info = copy.copy(info)
+    info.cls = SaidOnce
     command = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
     finish(command)
     return command
