@@ -37,7 +37,7 @@ from toolkit.diagnosis.simulators.states import (
     usual_step,
     way_of,
 )
-from toolkit.diagnosis.simulators.trajectory import Guesses, Path, trajectories
+from toolkit.diagnosis.simulators.trajectory import Guesses, Nodes, Path, trajectories
 from toolkit.diagnosis.simulators.turning import Turning
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -85,7 +85,7 @@ class OdeModel:
         self._steps: dict[Run, NDArray[np.intp]] = {}  # of the simulation as declared
         self._turning = Turning(self)
         self._alone: set[Any] = set()  # what does not come to its end with others
-        self._slopes: dict[tuple[Run, ...], NDArray[np.float64] | None] = {}
+        self._nodes: dict[tuple[Run, ...], Nodes | None] = {}  # the same from node to node, of several runs
         self._kept: Memory[dict[str, NDArray[np.float64]] | FitError] = Memory(_MOST_KEPT, _MOST_HELD)
         p = {parameter.name: parameter.value for parameter in case.parameters}
         start = self.equation.start(case.runs[0], p)
@@ -333,9 +333,7 @@ class OdeModel:
             x[:own, :, at] = self._near[run][:, None] if run in self._near else start[:, :, None]
             x[:own, :, at.start] = start
             steps[at.start : at.stop - 1] = self._guesses.steps(run, terms, self._steps.get(run, 1))
-        slopes = self._slopes.get(tuple(runs))
-        if slopes is not None and slopes.shape[2] != len(x):
-            slopes = None
+        last = self._nodes.get(tuple(runs))
         sizes = np.array(
             [*(self.scale.get(name, (1.0, 1.0))[1] for name in self.states), *[1.0] * together.added]
         )
@@ -344,16 +342,16 @@ class OdeModel:
         flow = RowFlow(columns, rows, p, together, atol)
         with silenced():
             smooth = ~together.abrupt & self._guesses.are_tried(terms)
-            path, reached = trajectories(flow, Path(x, steps, slopes), sizes, smooth)
+            path, reached = trajectories(flow, Path(x, steps, last), sizes, smooth)
         if smooth[0] and self.scale:
-            self._guesses.led(terms, on=path.slopes is not None)
+            self._guesses.led(terms, on=path.nodes is not None)
         for run, at in zip(runs, rows.slices, strict=True):
             if reached[0]:
                 self._near[run] = path.x[:own, 0, at]
             if path.enough is not None and self.scale:
                 self._steps.setdefault(run, path.steps[at.start : at.stop - 1])
                 self._guesses.did(run, terms, path.enough[at.start : at.stop - 1])
-        self._slopes[tuple(runs)] = path.slopes
+        self._nodes[tuple(runs)] = path.nodes and replace(path.nodes, x=path.nodes.x[:own])
         return [path.x[:, :, at] for at in rows.slices], reached
 
     def finer(self, run: Run) -> Run:
