@@ -20,7 +20,10 @@ def flow_of(rhs, runs, p, *, states):
 
 
 def test_nodes_part_the_intervals_of_each_run_and_none_between_two():
-    runs = [run_of(np.array([0.0, 1.0, 3.0]), u=np.array([0.0, 4.0, 2.0])), run_of(np.array([7.0, 9.0]), u=np.ones(2))]
+    runs = [
+        run_of(np.array([0.0, 1.0, 3.0]), u=np.array([0.0, 4.0, 2.0])),
+        run_of(np.array([7.0, 9.0]), u=np.ones(2)),
+    ]
     nodes = Rows(runs, ("u",)).parted(np.array([4, 2, 8, 1]))
     assert nodes.t.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0, 2.0, 3.0, 7.0, 9.0]
     assert nodes.u["u"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 1.0]

@@ -196,8 +196,8 @@ def _same(
 
     Parameters
     ----------
-    without, named, laws : unseen rows with neither, with the effects, and with the laws in their place; None of
-        laws that leave nothing
+    without, named, laws : unseen rows with neither, with the effects, and with the laws in their place, None
+        of laws that leave nothing
     least : share of what the laws take
     """
     for name in (name for name in problem.names if problem.kept[name].any()):

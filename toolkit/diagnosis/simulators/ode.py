@@ -77,6 +77,7 @@ class OdeModel:
         self.drivers = tuple(driver.name for driver in case.drivers)
         self._inputs = {driver.name for driver in case.drivers if driver.role == "input"}
         self._driven: dict[Any, Run] = {}
+        self._recorded: dict[Run, Run] = {}  # of a run with other inputs: a guess of one is one of the other
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
         self._guesses = Guesses()
@@ -254,7 +255,12 @@ class OdeModel:
         if key not in self._driven:
             true = true_inputs(run, disturbed, self._inputs, self.setting(run))
             self._driven[key] = replace(run, columns={**run.columns, **true})
+            self._recorded[self._driven[key]] = run
         return self._driven[key]
+
+    def recorded(self, run: Run) -> Run:
+        """Return a run with its inputs as they were recorded."""
+        return self._recorded.get(run, run)
 
     def _prepare(
         self,
@@ -265,24 +271,20 @@ class OdeModel:
         runs = [run for run in runs if run.rows > 1]
         if self.equation.columns is None or not runs:
             return
-        listed = {}
+        groups: dict[tuple[Run, ...], dict[Any, tuple[Any, ...]]] = {}
         for p, active in points:
-            if any(applied.channel in self._inputs for applied in active):
-                continue
-            keys = tuple(self._key(run, p, active)[0] for run in runs)
-            listed[keys] = (p, [applied for applied in active if applied.effect.stage == "dynamics"])
+            driven = tuple(self._as_driven(run, active) for run in runs)
+            keys = tuple(self._key(run, p, active)[0] for run in driven)
+            acting = [applied for applied in active if applied.effect.stage == "dynamics"]
+            groups.setdefault(driven, {})[keys] = (keys, p, acting)
         # Those that are known already are done again with the others: their steps are then the same, and
         # differences between them are free of what the steps leave.
-        if all(key in self._kept for keys in listed for key in keys):
-            return
-        self._together(runs, [(keys, *point) for keys, point in listed.items()])
+        for driven, listed in groups.items():
+            if not all(key in self._kept for keys in listed for key in keys):
+                self._together(driven, list(listed.values()))
 
-    def _together(
-        self,
-        runs: Sequence[Run],
-        listed: list[tuple[tuple[Any, ...], Mapping[str, float], list[AppliedEffect]]],
-    ) -> None:
-        """Integrate sets together; one that does not come to its end is left to be integrated alone."""
+    def _together(self, runs: Sequence[Run], listed: list[tuple[Any, ...]]) -> None:
+        """Integrate sets (keys, parameters, effects); one that does not come to its end is left alone."""
         rest = listed
         for solve in (self._turning.solved, self._solved):
             if not rest:
@@ -329,11 +331,12 @@ class OdeModel:
         p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
         steps = np.ones(len(rows.t) - 1, dtype=np.intp)
+        runs = tuple(map(self.recorded, runs))
         for run, at, start in zip(runs, rows.slices, starts, strict=True):
             x[:own, :, at] = self._near[run][:, None] if run in self._near else start[:, :, None]
             x[:own, :, at.start] = start
             steps[at.start : at.stop - 1] = self._guesses.steps(run, terms, self._steps.get(run, 1))
-        last = self._nodes.get(tuple(runs))
+        last = self._nodes.get(runs)
         sizes = np.array(
             [*(self.scale.get(name, (1.0, 1.0))[1] for name in self.states), *[1.0] * together.added]
         )
@@ -351,7 +354,7 @@ class OdeModel:
             if path.enough is not None and self.scale:
                 self._steps.setdefault(run, path.steps[at.start : at.stop - 1])
                 self._guesses.did(run, terms, path.enough[at.start : at.stop - 1])
-        self._nodes[tuple(runs)] = path.nodes and replace(path.nodes, x=path.nodes.x[:own])
+        self._nodes[runs] = path.nodes and replace(path.nodes, x=path.nodes.x[:own])
         return [path.x[:, :, at] for at in rows.slices], reached
 
     def finer(self, run: Run) -> Run:
@@ -403,7 +406,7 @@ class OdeModel:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
             raise self.equation.failure("rhs", error, run, p) from error
-        self._near[run] = x[: len(self.states)]
+        self._near[self.recorded(run)] = x[: len(self.states)]
         return x
 
     def tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
@@ -420,14 +423,9 @@ class OdeModel:
         return Forces.of(active, self.states, self.derivative_of, self.scale, self.drivers, self.feeds)
 
     def _made(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        forces: Sequence[AppliedEffect],
-        x: NDArray[np.float64],
-        *,
-        between: bool,
-    ) -> dict[str, NDArray[np.float64]]:
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], x: NDArray[np.float64],
+        *, between: bool,
+    ) -> dict[str, NDArray[np.float64]]:  # fmt: skip
         """Return the outputs of integrated states, also ``between`` the rows."""
         if between:
             x, run = self.between(run, p, forces, x), self.finer(run)

@@ -39,9 +39,9 @@ _ROWS, _WEIGHTS, _ERROR = tuple(np.array(row) for row in A), np.array(B), np.arr
 class Rows:
     """The rows of several runs one behind the other; between two runs nothing flows.
 
-    ``t``, ``u`` (rows,); ``run`` is the place of every row's run; ``last`` are the last rows of the runs. Nodes
-    are rows with others between them: ``at`` are the places of the recorded rows among them, ``place`` where
-    each of them is, in recorded rows.
+    ``t``, ``u`` (rows,); ``run`` is the place of every row's run; ``last`` are the last rows of the runs.
+    Nodes are rows with others between them: ``at`` are the places of the recorded rows among them, ``place``
+    where each of them is, in recorded rows.
     """
 
     def __init__(self, runs: Sequence[Run], drivers: Sequence[str]) -> None:
