@@ -1,5 +1,10 @@
 """Steps within an interval go side by side: nodes between the rows, each a step from the next."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
@@ -8,18 +13,22 @@ from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 from toolkit.diagnosis.simulators.trajectory import Path, trajectories
 
+if TYPE_CHECKING:
+    from toolkit.arrays import Array
+    from toolkit.diagnosis.simulators.columnwise import Columnwise
 
-def run_of(t, **columns):
+
+def run_of(t: Array, **columns: Array) -> Run:
     return Run(name=f"{len(t)}.csv", t=t, columns=columns, conditions={}, declared={}, simulated={})
 
 
-def flow_of(rhs, runs, p, *, states):
+def flow_of(rhs: Columnwise, runs: Sequence[Run], p: Mapping[str, Array], *, states: int) -> RowFlow:
     sets = len(next(iter(p.values())))
     together = ForcesTogether([Forces((), 0)] * sets, states, runs)
     return RowFlow(rhs, Rows(runs, ("u",)), p, together, np.full((states, sets), 1e-9))
 
 
-def test_nodes_part_the_intervals_of_each_run_and_none_between_two():
+def test_nodes_part_the_intervals_of_each_run_and_none_between_two() -> None:
     runs = [
         run_of(np.array([0.0, 1.0, 3.0]), u=np.array([0.0, 4.0, 2.0])),
         run_of(np.array([7.0, 9.0]), u=np.ones(2)),
@@ -34,8 +43,8 @@ def test_nodes_part_the_intervals_of_each_run_and_none_between_two():
     assert nodes.run.tolist() == [0] * 7 + [1] * 2
 
 
-def test_from_node_to_node_a_state_comes_where_steps_one_after_the_other_lead():
-    def rhs(t, x, u, p):
+def test_from_node_to_node_a_state_comes_where_steps_one_after_the_other_lead() -> None:
+    def rhs(t: Array, x: Array, u: Mapping[str, Array], p: Mapping[str, Array]) -> Array:
         return np.stack([x[1], u["u"] - p["k"] * np.sin(x[0])])
 
     t = np.array([0.0, 0.3, 0.5, 1.1])
@@ -57,12 +66,12 @@ def test_from_node_to_node_a_state_comes_where_steps_one_after_the_other_lead():
 
 
 @pytest.mark.parametrize("quick", [1.0, 10.0])
-def test_a_motion_that_is_quick_in_places_asks_no_more_often(quick):
-    asked = []
+def test_a_motion_that_is_quick_in_places_asks_no_more_often(quick: float) -> None:
+    asked: list[int] = []
 
-    def rhs(t, x, u, p):
+    def rhs(t: Array, x: Array, u: Mapping[str, Array], p: Mapping[str, Array]) -> Array:
         asked.append(x.shape[1])
-        return p["k"] * u["u"] * np.cos(u["u"] * t)[None]
+        return np.array([p["k"] * u["u"] * np.cos(u["u"] * t)])
 
     t = np.arange(0.0, 10.0, 0.1)
     # An input of one row: sin(u t) goes through several turns beside it.

@@ -58,6 +58,10 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.simulator import Largest
     from toolkit.worker.serve import Handlers
 
+    _Set = tuple[
+        tuple[Any, ...], Mapping[str, float], list[AppliedEffect]
+    ]  # keys of the runs, parameters, forces
+
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 FINER = 4  # rows between two rows, one of them among them
 _LEVELS = 41  # quantiles of a state
@@ -271,7 +275,7 @@ class OdeModel:
         runs = [run for run in runs if run.rows > 1]
         if self.equation.columns is None or not runs:
             return
-        groups: dict[tuple[Run, ...], dict[Any, tuple[Any, ...]]] = {}
+        groups: dict[tuple[Run, ...], dict[Any, _Set]] = {}
         for p, active in points:
             driven = tuple(self._as_driven(run, active) for run in runs)
             keys = tuple(self._key(run, p, active)[0] for run in driven)
@@ -283,7 +287,7 @@ class OdeModel:
             if not all(key in self._kept for keys in listed for key in keys):
                 self._together(driven, list(listed.values()))
 
-    def _together(self, runs: Sequence[Run], listed: list[tuple[Any, ...]]) -> None:
+    def _together(self, runs: Sequence[Run], listed: list[_Set]) -> None:
         """Integrate sets (keys, parameters, effects); one that does not come to its end is left alone."""
         rest = listed
         for solve in (self._turning.solved, self._solved):
