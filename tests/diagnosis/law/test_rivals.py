@@ -225,6 +225,46 @@ def test_a_name_that_takes_nearly_all_that_laws_take_stays(
 
 
 @pytest.mark.parametrize(
+    ("share", "shown_sd", "asked"),
+    [
+        (0.97, {}, False),
+        (0.93, {}, True),  # laws may take the rest
+        (0.97, {"gain": 0.01}, True),  # laws may leave the sensor's noise where the name leaves more
+    ],
+)
+def test_no_laws_are_learned_in_place_of_a_name_that_none_could_displace(
+    outdone_name: tuple[Search, Laws],
+    monkeypatch: pytest.MonkeyPatch,
+    share: float,
+    shown_sd: dict[str, float],
+    *,
+    asked: bool,
+) -> None:
+    """Laws take at most all that is left without the name: of that the name takes nearly all itself."""
+    search, laws = outdone_name
+    observed, learned_of = search.problem.observed["gain"], []
+
+    def off(error: float) -> HeldOut:
+        return HeldOut(scores=(0.0,), simulated={"gain": observed - error}, fits=())
+
+    search = replace(search, held_refitted=off(1.0), held_augmented=off(math.sqrt(1 - share)))
+
+    def learned(bare: Search, **_: object) -> Laws:
+        learned_of.append(bare)
+        return Laws(listed=(), fit=bare.refitted, held_out=bare.held_refitted)
+
+    def noise_known(bare: Search, **_: object) -> Search:
+        return replace(bare, problem=replace(bare.problem, shown_sd=shown_sd))
+
+    monkeypatch.setattr(rivals, "before_nothing", noise_known)
+    monkeypatch.setattr(rivals, "learned", learned)
+    monkeypatch.setattr(rivals, "_leaves_process_noise", lambda _: True)
+    judged, listed = judged_by_laws(search, laws, seed=1, budget=ample())
+    assert bool(learned_of) is asked
+    assert (judged, listed) == (search, laws)
+
+
+@pytest.mark.parametrize(
     ("names", "foretold", "left", "stay"),
     [
         (2, 2.0, 0.1, False),

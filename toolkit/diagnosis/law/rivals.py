@@ -46,16 +46,25 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     beside = any(step.active.key == applied.key for step in search.steps for applied in laws.fit.active)
     if not beside or not is_asked or not laws.complete:
         return search, laws
+    leaves_noise = _leaves_process_noise(search)
+    least = LAWS.same if leaves_noise else VERDICT.nearly
+    # Laws take at most all there is: where one effect takes nearly that, it keeps its name whatever they are.
+    settled = len(_effects(search)) < 2 and _same(
+        search.problem, search.held_refitted, search.held_augmented, None, least=least
+    )
+    if settled and not leaves_noise:
+        return search, laws
     try:
         bare = before_nothing(_bare(search), seed=seed, budget=budget)
     except BudgetSpentError:
         return search, replace(laws, complete=False)
+    if settled and not bare.problem.shown_sd:
+        return search, laws
     alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
         return search, laws if alone.complete else replace(laws, complete=False)
-    if bare.problem.shown_sd and _leaves_process_noise(search) and not _process_noise(search, alone.fit):
+    if bare.problem.shown_sd and leaves_noise and not _process_noise(search, alone.fit):
         return bare, alone
-    least = LAWS.same if _leaves_process_noise(search) else VERDICT.nearly
     alike = _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least)
     if alike and not _does_with_fewer(search, alone):
         return search, laws
@@ -77,9 +86,8 @@ def _does_with_fewer(search: Search, alone: Laws) -> bool:
     together, however much of it they take. Better is a higher held-out score, and no output with more error.
     """
     problem, named = search.problem, search.held_augmented
-    effects = [step for step in search.steps if not step.active.effect.from_digits]
     return (
-        len(alone.listed) < len(effects)
+        len(alone.listed) < len(_effects(search))
         and _parameters(alone.fit) < _parameters(search.augmented)
         and alone.held_out.total - named.total >= STEP.least_gain
         and all(
@@ -88,6 +96,11 @@ def _does_with_fewer(search: Search, alone: Laws) -> bool:
             if problem.kept[name].any()
         )
     )
+
+
+def _effects(search: Search) -> list[Step]:
+    """Return the steps that are no lattice of the recorded digits."""
+    return [step for step in search.steps if not step.active.effect.from_digits]
 
 
 def _holds_beside(laws: Laws, step: Step) -> bool:
@@ -177,22 +190,22 @@ def _error(problem: Problem, held_out: HeldOut, name: str) -> float:
 
 
 def _same(
-    problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut, *, least: float = LAWS.same
+    problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut | None, *, least: float = LAWS.same
 ) -> bool:
     """Tell whether effects take nearly all that laws in their place take: these are then their own formulas.
 
     Parameters
     ----------
-    without, named, laws : unseen rows with neither, with the effects, and with the laws in their place
+    without, named, laws : unseen rows with neither, with the effects, and with the laws in their place, None
+        of laws that leave nothing
     least : share of what the laws take
     """
-
-    outputs = [name for name in problem.names if problem.kept[name].any()]
-    taken = [
-        tuple(_error(problem, without, name) - _error(problem, each, name) for each in (named, laws))
-        for name in outputs
-    ]
-    return all(by_effects >= least * by_laws for by_effects, by_laws in taken)
+    for name in (name for name in problem.names if problem.kept[name].any()):
+        before = _error(problem, without, name)
+        by_laws = before - (0.0 if laws is None else _error(problem, laws, name))
+        if before - _error(problem, named, name) < least * by_laws:
+            return False
+    return True
 
 
 def _parameters(fit: Fit) -> int:

@@ -100,10 +100,11 @@ def columnwise(
     except Exception:  # noqa: BLE001 - whatever a user's code raises: the same state alone raises it by name
         return None
 
-    def plain(t: Array, x: Array, u: Mapping[str, Array], p: Mapping[str, Array]) -> Array:
-        return stacked(ask(function, t, x, dict(u), dict(p)), x.shape[1])
-
-    for way in (plain, _parted(function, ask), _parted(_with_numpy(function), ask)):
+    with_numpy = _with_numpy(function)
+    ways = (
+        _whole(function, ask), _whole(with_numpy, ask), _parted(function, ask), _parted(with_numpy, ask)
+    )  # fmt: skip
+    for way in ways:
         try:
             together = way(t, x.copy(), u, p)
         except Exception:  # noqa: BLE001, S112 - it does not take columns in this way
@@ -111,6 +112,13 @@ def columnwise(
         if together.shape == alone.shape and np.allclose(together, alone, rtol=_SAME, atol=0, equal_nan=True):
             return way
     return None
+
+
+def _whole(function: Callable[..., Any], ask: Ask) -> Columnwise:
+    def call(t: Array, x: Array, u: Mapping[str, Array], p: Mapping[str, Array]) -> Array:
+        return stacked(ask(function, t, x, dict(u), dict(p)), x.shape[1])
+
+    return call
 
 
 def _parted(function: Callable[..., Any], ask: Ask) -> Columnwise:

@@ -64,6 +64,7 @@ class Equation:
         self, case: Case, rhs: Callable[..., Any], outputs: Callable[..., Any], initial: Callable[..., Any]
     ) -> None:
         self.case, self.rhs, self._outputs, self._initial = case, rhs, outputs, initial
+        self._takes_run: bool | None = None  # `initial`, once it was asked
         self._drivers = tuple(channel.name for channel in case.drivers)
         self._shown = tuple(output.name for output in case.outputs)
         self.columns: Columnwise | None = None
@@ -78,8 +79,9 @@ class Equation:
         import inspect
 
         try:
-            many = len(inspect.signature(self._initial).parameters) > 1
-            given = self._initial(dict(p), _as_dict(run)) if many else self._initial(dict(p))
+            if self._takes_run is None:
+                self._takes_run = len(inspect.signature(self._initial).parameters) > 1
+            given = self._initial(dict(p), _as_dict(run)) if self._takes_run else self._initial(dict(p))
             start = np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
         except (Exception, SystemExit) as error:
             raise self.failure("initial", error, run, p) from error

@@ -37,7 +37,7 @@ from toolkit.diagnosis.simulators.states import (
     usual_step,
     way_of,
 )
-from toolkit.diagnosis.simulators.trajectory import Guesses, Path, trajectories
+from toolkit.diagnosis.simulators.trajectory import Guesses, Nodes, Path, trajectories
 from toolkit.diagnosis.simulators.turning import Turning
 from toolkit.diagnosis.simulators.user_code import load_functions, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -58,6 +58,10 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.simulator import Largest
     from toolkit.worker.serve import Handlers
 
+    _Set = tuple[
+        tuple[Any, ...], Mapping[str, float], list[AppliedEffect]
+    ]  # keys of the runs, parameters, forces
+
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 FINER = 4  # rows between two rows, one of them among them
 _LEVELS = 41  # quantiles of a state
@@ -77,6 +81,7 @@ class OdeModel:
         self.drivers = tuple(driver.name for driver in case.drivers)
         self._inputs = {driver.name for driver in case.drivers if driver.role == "input"}
         self._driven: dict[Any, Run] = {}
+        self._recorded: dict[Run, Run] = {}  # of a run with other inputs: a guess of one is one of the other
         self._settings: dict[Run, Setting] = {}
         self._fine: dict[Run, Run] = {}
         self._guesses = Guesses()
@@ -85,7 +90,7 @@ class OdeModel:
         self._steps: dict[Run, NDArray[np.intp]] = {}  # of the simulation as declared
         self._turning = Turning(self)
         self._alone: set[Any] = set()  # what does not come to its end with others
-        self._slopes: dict[tuple[Run, ...], NDArray[np.float64] | None] = {}
+        self._nodes: dict[tuple[Run, ...], Nodes | None] = {}  # the same from node to node, of several runs
         self._kept: Memory[dict[str, NDArray[np.float64]] | FitError] = Memory(_MOST_KEPT, _MOST_HELD)
         p = {parameter.name: parameter.value for parameter in case.parameters}
         start = self.equation.start(case.runs[0], p)
@@ -254,7 +259,12 @@ class OdeModel:
         if key not in self._driven:
             true = true_inputs(run, disturbed, self._inputs, self.setting(run))
             self._driven[key] = replace(run, columns={**run.columns, **true})
+            self._recorded[self._driven[key]] = run
         return self._driven[key]
+
+    def recorded(self, run: Run) -> Run:
+        """Return a run with its inputs as they were recorded."""
+        return self._recorded.get(run, run)
 
     def _prepare(
         self,
@@ -265,24 +275,20 @@ class OdeModel:
         runs = [run for run in runs if run.rows > 1]
         if self.equation.columns is None or not runs:
             return
-        listed = {}
+        groups: dict[tuple[Run, ...], dict[Any, _Set]] = {}
         for p, active in points:
-            if any(applied.channel in self._inputs for applied in active):
-                continue
-            keys = tuple(self._key(run, p, active)[0] for run in runs)
-            listed[keys] = (p, [applied for applied in active if applied.effect.stage == "dynamics"])
+            driven = tuple(self._as_driven(run, active) for run in runs)
+            keys = tuple(self._key(run, p, active)[0] for run in driven)
+            acting = [applied for applied in active if applied.effect.stage == "dynamics"]
+            groups.setdefault(driven, {})[keys] = (keys, p, acting)
         # Those that are known already are done again with the others: their steps are then the same, and
         # differences between them are free of what the steps leave.
-        if all(key in self._kept for keys in listed for key in keys):
-            return
-        self._together(runs, [(keys, *point) for keys, point in listed.items()])
+        for driven, listed in groups.items():
+            if not all(key in self._kept for keys in listed for key in keys):
+                self._together(driven, list(listed.values()))
 
-    def _together(
-        self,
-        runs: Sequence[Run],
-        listed: list[tuple[tuple[Any, ...], Mapping[str, float], list[AppliedEffect]]],
-    ) -> None:
-        """Integrate sets together; one that does not come to its end is left to be integrated alone."""
+    def _together(self, runs: Sequence[Run], listed: list[_Set]) -> None:
+        """Integrate sets (keys, parameters, effects); one that does not come to its end is left alone."""
         rest = listed
         for solve in (self._turning.solved, self._solved):
             if not rest:
@@ -329,13 +335,12 @@ class OdeModel:
         p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
         steps = np.ones(len(rows.t) - 1, dtype=np.intp)
+        runs = tuple(map(self.recorded, runs))
         for run, at, start in zip(runs, rows.slices, starts, strict=True):
             x[:own, :, at] = self._near[run][:, None] if run in self._near else start[:, :, None]
             x[:own, :, at.start] = start
             steps[at.start : at.stop - 1] = self._guesses.steps(run, terms, self._steps.get(run, 1))
-        slopes = self._slopes.get(tuple(runs))
-        if slopes is not None and slopes.shape[2] != len(x):
-            slopes = None
+        last = self._nodes.get(runs)
         sizes = np.array(
             [*(self.scale.get(name, (1.0, 1.0))[1] for name in self.states), *[1.0] * together.added]
         )
@@ -344,16 +349,16 @@ class OdeModel:
         flow = RowFlow(columns, rows, p, together, atol)
         with silenced():
             smooth = ~together.abrupt & self._guesses.are_tried(terms)
-            path, reached = trajectories(flow, Path(x, steps, slopes), sizes, smooth)
+            path, reached = trajectories(flow, Path(x, steps, last), sizes, smooth)
         if smooth[0] and self.scale:
-            self._guesses.led(terms, on=path.slopes is not None)
+            self._guesses.led(terms, on=path.nodes is not None)
         for run, at in zip(runs, rows.slices, strict=True):
             if reached[0]:
                 self._near[run] = path.x[:own, 0, at]
             if path.enough is not None and self.scale:
                 self._steps.setdefault(run, path.steps[at.start : at.stop - 1])
                 self._guesses.did(run, terms, path.enough[at.start : at.stop - 1])
-        self._slopes[tuple(runs)] = path.slopes
+        self._nodes[runs] = path.nodes and replace(path.nodes, x=path.nodes.x[:own])
         return [path.x[:, :, at] for at in rows.slices], reached
 
     def finer(self, run: Run) -> Run:
@@ -405,7 +410,7 @@ class OdeModel:
             raise failed(self.case, run, f"the integration ended early: {error}") from error
         except (Exception, SystemExit) as error:
             raise self.equation.failure("rhs", error, run, p) from error
-        self._near[run] = x[: len(self.states)]
+        self._near[self.recorded(run)] = x[: len(self.states)]
         return x
 
     def tolerance(self, start: NDArray[np.float64], acting: Forces, added: int) -> NDArray[np.float64]:
@@ -422,14 +427,9 @@ class OdeModel:
         return Forces.of(active, self.states, self.derivative_of, self.scale, self.drivers, self.feeds)
 
     def _made(
-        self,
-        run: Run,
-        p: Mapping[str, float],
-        forces: Sequence[AppliedEffect],
-        x: NDArray[np.float64],
-        *,
-        between: bool,
-    ) -> dict[str, NDArray[np.float64]]:
+        self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], x: NDArray[np.float64],
+        *, between: bool,
+    ) -> dict[str, NDArray[np.float64]]:  # fmt: skip
         """Return the outputs of integrated states, also ``between`` the rows."""
         if between:
             x, run = self.between(run, p, forces, x), self.finer(run)

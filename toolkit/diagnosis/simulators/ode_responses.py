@@ -44,6 +44,10 @@ class IntegratedModel(Protocol):
         """Return effects as forces on the equation's states."""
         ...
 
+    def recorded(self, run: Run) -> Run:
+        """Return a run with its inputs as they were recorded."""
+        ...
+
     def tolerance(self, start: Array, acting: Forces, added: int) -> Array:
         """Return the absolute tolerance of every state, ``added`` ones among them."""
         ...

@@ -10,6 +10,7 @@ Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,8 @@ class Rows:
     """The rows of several runs one behind the other; between two runs nothing flows.
 
     ``t``, ``u`` (rows,); ``run`` is the place of every row's run; ``last`` are the last rows of the runs.
+    Nodes are rows with others between them: ``at`` are the places of the recorded rows among them, ``place``
+    where each of them is, in recorded rows.
     """
 
     def __init__(self, runs: Sequence[Run], drivers: Sequence[str]) -> None:
@@ -50,6 +53,29 @@ class Rows:
         self.slices = tuple(
             slice(int(end) + 1 - count, int(end) + 1) for end, count in zip(self.last, counts, strict=True)
         )
+        self.at, self.place = np.arange(len(self.t)), np.arange(len(self.t), dtype=np.float64)
+
+    def parted(self, steps: Places) -> Rows:
+        """Return the rows with nodes between them, one for every step of an interval but the last.
+
+        Parameters
+        ----------
+        steps : of every interval, (rows - 1,); of one between two runs nothing is asked
+        """
+        counts = steps.copy()
+        counts[self.last[:-1]] = 1
+        nodes, at = copy(self), np.concatenate([[0], np.cumsum(counts)])
+        row = np.repeat(np.arange(len(steps)), counts)
+        share = (np.arange(len(row)) - at[row]) / counts[row]
+
+        def between(column: Array) -> Array:
+            return np.append(column[row] + share * (column[row + 1] - column[row]), column[-1])
+
+        nodes.t, nodes.u = between(self.t), {name: between(column) for name, column in self.u.items()}
+        nodes.run, nodes.last = np.append(self.run[row], self.run[-1]), at[self.last]
+        nodes.slices = tuple(slice(int(at[of.start]), int(at[of.stop - 1]) + 1) for of in self.slices)
+        nodes.at, nodes.place = at, np.append(row + share, float(len(steps)))
+        return nodes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +103,24 @@ class RowFlow:
     ) -> None:
         self._rhs, self.rows, self._p, self._forces = rhs, rows, p, forces
         self.atol = atol
+        self._single: dict[bytes, _Stretch] = {}
+
+    def parted(self, steps: Places) -> RowFlow:
+        """Return the flow from node to node, each in a single step, in place of steps one after the other."""
+        return RowFlow(self._rhs, self.rows.parted(steps), self._p, self._forces, self.atol)
+
+    def on(self, x: Array, sets: Places) -> tuple[Array, Array]:
+        """Return what a call with a single step of every interval returns; sets that come again cost less."""
+        rows, key = self.rows, sets.tobytes()
+        if key not in self._single:
+            self._single[key] = self._stretch(np.delete(np.arange(len(rows.t) - 1), rows.last[:-1]), sets)
+        ends, errors = x[:, :, 1:].copy(), np.zeros((x.shape[1], x.shape[2] - 1))
+        at: slice | Places = self._single[key].at if len(rows.last) > 1 else slice(0, -1)
+        end, error = _led(x[:, :, at].reshape(len(x), -1), self._single[key], 1)
+        at = slice(None) if len(rows.last) == 1 else at
+        ends[:, :, at] = end.reshape(len(x), len(sets), -1)
+        errors[:, at] = error.reshape(len(sets), -1)
+        return ends, errors
 
     def __call__(self, x: Array, steps: Places, sets: Places) -> tuple[Array, Array]:
         """Return the states one row on, and the largest error of a step as a share of what is allowed.
@@ -96,7 +140,7 @@ class RowFlow:
         flows[self.rows.last[:-1]] = False
         for count in np.unique(steps[flows]).tolist():
             at = np.flatnonzero(flows & (steps == count))
-            end, error = self._led(x[:, :, at].reshape(len(x), -1), at, count, sets)
+            end, error = _led(x[:, :, at].reshape(len(x), -1), self._stretch(at, sets), count)
             ends[:, :, at] = end.reshape(len(x), len(sets), -1)
             errors[:, at] = error.reshape(len(sets), -1)
         return ends, errors
@@ -128,24 +172,39 @@ class RowFlow:
 
         return rates
 
-    def _led(self, y: Array, at: Places, count: int, sets: Places) -> tuple[Array, Array]:
-        places, of = np.tile(at, len(sets)), np.repeat(sets, len(at))
-        columns = self.columns(places, of)
-        rates, bristles, atol = self.equation(places, columns), columns.acting.bristles, columns.atol
-        h = (self.rows.t[places + 1] - self.rows.t[places]) / count
-        worst, first = np.zeros(y.shape[1]), rates(0.0, y)
-        for i in range(count):
-            free = np.zeros(y.shape[1], dtype=bool)
-            while True:
-                held = bristles.held(y, first, free)
-                z, last, share = stepped(rates, y, first, h, i / count, 1 / count, atol, held)
-                if not any(slide.turned.any() for slide in held.slides):
-                    break
-                for slide in held.slides:
-                    free[slide.leads] |= slide.turned
-            y, first = z, last
-            np.maximum(worst, share, out=worst)
-        return y, worst
+    def _stretch(self, at: Places, sets: Places) -> _Stretch:
+        places = np.tile(at, len(sets))
+        columns = self.columns(places, np.repeat(sets, len(at)))
+        length = self.rows.t[places + 1] - self.rows.t[places]
+        return _Stretch(at, columns, self.equation(places, columns), length)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stretch:
+    """Rows of sets that are led on together: what does not change on the way to the next rows."""
+
+    at: Places
+    columns: Columns
+    rates: Rates
+    length: Array
+
+
+def _led(y: Array, on: _Stretch, count: int) -> tuple[Array, Array]:
+    """Return states and errors after ``count`` steps to the next rows."""
+    rates, bristles, atol = on.rates, on.columns.acting.bristles, on.columns.atol
+    h, worst, first = on.length / count, np.zeros(y.shape[1]), rates(0.0, y)
+    for i in range(count):
+        free = np.zeros(y.shape[1], dtype=bool)
+        while True:
+            held = bristles.held(y, first, free)
+            z, last, share = stepped(rates, y, first, h, i / count, 1 / count, atol, held)
+            if not any(slide.turned.any() for slide in held.slides):
+                break
+            for slide in held.slides:
+                free[slide.leads] |= slide.turned
+        y, first = z, last
+        np.maximum(worst, share, out=worst)
+    return y, worst
 
 
 def stepped(

@@ -11,7 +11,7 @@ Source: Kiehl, Parallel Computing 20 (1994) 275 (parallel multiple shooting).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from toolkit.diagnosis.case.case import Run
-    from toolkit.diagnosis.simulators.row_flow import RowFlow
+    from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
@@ -41,15 +41,27 @@ _MARCHED = 8  # columns: fewer are integrated in less time one by one, by plain 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Nodes:
+    """A path from node to node: their places in rows, (nodes,), states, (states, sets, nodes), derivatives.
+
+    The flow's derivatives are (nodes - 1, 1, states, states), or none.
+    """
+
+    place: Array
+    x: Array
+    slopes: Array | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """States at every row, (states, sets, rows), the steps of every interval, and the flow's derivatives.
+    """States at every row, (states, sets, rows), the steps of every interval, and the path from node to node.
 
     ``enough`` are the steps that would have done, by their errors: what a simulation near by begins with.
     """
 
     x: Array
     steps: Places
-    slopes: Array | None
+    nodes: Nodes | None
     enough: Places | None = None
 
 
@@ -99,15 +111,18 @@ def trajectories(
 
     Parameters
     ----------
-    guess : the first rows of the runs are their starts; the steps are the fewest; derivatives of a path near
-        by, or none
+    guess : the first rows of the runs are their starts; the steps are the fewest; a path near by, or none
     sizes : of the states, for differences, (states,)
     smooth : which sets may come from a guess at all, (sets,)
     """
-    x, steps, slopes = guess.x.copy(), guess.steps, guess.slopes
+    x, steps, last = guess.x.copy(), guess.steps, guess.nodes
     rest = np.flatnonzero(smooth)
-    for _ in range(_REFINED if len(rest) else 0):
-        errors, slopes, solved = _converged(flow, x, rest, steps, slopes, sizes)
+    for turn in range(_REFINED if len(rest) else 0):
+        nodes = flow.parted(steps)
+        y, slopes = _begun(x, nodes.rows, flow.rows, last, of_all=turn > 0)
+        shares, slopes, solved = _converged(nodes, y, rest, slopes, sizes)
+        x, last = y[:, :, nodes.rows.at], Nodes(nodes.rows.place, y, slopes)
+        errors = np.maximum.reduceat(shares, nodes.rows.at[:-1], axis=1)
         wanted = finer(steps, errors)
         able = solved & (wanted.max(axis=1) <= MOST_STEPS)  # the others are not waited for
         rest = rest[able]
@@ -120,21 +135,63 @@ def trajectories(
     if len(others) * len(flow.rows.slices) >= _MARCHED:
         starts = guess.x[:, others][:, :, [at.start for at in flow.rows.slices]]
         x[:, others], reached[others] = march(flow, starts, others)
-    if not len(rest):
+    if not len(rest) or last is None:
         return Path(x, guess.steps, None), reached
-    return Path(x, steps, slopes, enough(steps, errors[able])), reached
+    return Path(x, steps, replace(last, x=last.x[:, rest[:1]]), enough(steps, errors[able])), reached
+
+
+def _begun(
+    x: Array, rows: Rows, recorded: Rows, last: Nodes | None, *, of_all: bool
+) -> tuple[Array, Array | None]:
+    """Return states at nodes to begin from, and the flow's derivatives near by, if there are any.
+
+    Parameters
+    ----------
+    x : states at the recorded rows, (states, sets, rows)
+    last : states at other nodes: of all the sets, or of one near by, which has the equation's own ones
+    """
+    place = recorded.place if last is None else last.place
+    before = np.clip(np.searchsorted(place, rows.place, side="right") - 1, 0, len(place) - 2)
+    share = (rows.place - place[before]) / (place[before + 1] - place[before])
+
+    def between(values: Array) -> Array:
+        return values[:, :, before] + share * (values[:, :, before + 1] - values[:, :, before])
+
+    if last is None:
+        return between(x), None
+    if of_all:
+        y = between(last.x)
+    else:
+        y = np.zeros((*x.shape[:2], len(rows.t)))
+        y[: len(last.x)] = between(last.x)
+    begun = [at.start for at in rows.slices]
+    y[:, :, begun] = x[:, :, [at.start for at in recorded.slices]]
+    if last.slopes is None or last.slopes.shape[2] != len(x):
+        return y, None
+    # Of another length of time the derivatives differ from one by so much more or less.
+    longer = np.diff(rows.place) / np.diff(place)[before[:-1]]
+    one = np.eye(len(x))
+    slopes = one + longer[:, None, None, None] * (last.slopes[before[:-1]] - one)
+    slopes[rows.last[:-1]] = 0.0
+    return y, slopes
 
 
 def _converged(
-    flow: RowFlow, x: Array, sets: Places, steps: Places, near: Array | None, sizes: Array
+    flow: RowFlow, x: Array, sets: Places, near: Array | None, sizes: Array
 ) -> tuple[Array, Array | None, NDArray[np.bool_]]:
     """Move the states of some sets to where they follow from each other, in place.
 
+    Parameters
+    ----------
+    flow : from node to node
+    x : states at the nodes, (states, sets, nodes)
+    near : the flow's derivatives near by, (nodes - 1, 1, states, states), or none
+
     Returns
     -------
-    errors of each set's intervals, (sets, rows - 1), derivatives of the flow, and which sets came to rest
+    errors of each set's steps, (sets, nodes - 1), derivatives of the flow, and which sets came to rest
     """
-    errors = np.zeros((len(sets), len(steps)))
+    errors = np.zeros((len(sets), x.shape[2] - 1))
     active, slopes, kept = np.arange(len(sets)), near, near
     before, missed = np.full(len(sets), np.inf), np.full(len(sets), np.inf)
     stalled = np.zeros(len(sets), dtype=np.intp)
@@ -142,11 +199,11 @@ def _converged(
     for _ in range(_SWEEPS):
         at = sets[active]
         there = x[:, at]
-        ends, shares = flow(there, steps, at)
+        ends, shares = flow.on(there, at)
         if slopes is None:
             # At first those of one set stand for all: they are seldom far from each other.
             chosen = slice(0, 1) if kept is None else slice(None)
-            slopes = flow_slopes(flow, there[:, chosen], ends[:, chosen], steps, at[chosen], sizes)
+            slopes = _single_slopes(flow, there[:, chosen], ends[:, chosen], at[chosen], sizes)
             kept = slopes[:, :1] if kept is None or len(active) == len(sets) else kept
         off_rows = ends - there[:, :, 1:]
         moved = recursion(slopes, off_rows)
@@ -175,6 +232,25 @@ def _converged(
     return errors, kept, solved
 
 
+def _single_slopes(flow: RowFlow, x: Array, ends: Array, sets: Places, sizes: Array) -> Array:
+    """Return the derivatives of the flow from node to node, (nodes - 1, sets, states, states)."""
+    n, count = len(x), len(sets)
+    moved = np.tile(x, (1, n, 1))
+    for i in range(n):
+        moved[i, i * count : (i + 1) * count] += _STEP * sizes[i]
+    on, _ = flow.on(moved, np.tile(sets, n))
+    on = on.reshape(n, n, count, -1) - ends[:, None]
+    slopes = (on / (_STEP * sizes)[None, :, None, None]).transpose(3, 2, 0, 1)
+    return _within_runs(flow, slopes)
+
+
+def _within_runs(flow: RowFlow, slopes: Array) -> Array:
+    """Return derivatives without those between runs, where nothing flows, and none that is no number."""
+    slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+    slopes[flow.rows.last[:-1]] = 0.0
+    return slopes
+
+
 def flow_slopes(flow: RowFlow, x: Array, ends: Array, steps: Places, sets: Places, sizes: Array) -> Array:
     """Return the derivatives of the flow at every row, (rows, sets, states, states)."""
     n = len(x)
@@ -184,14 +260,13 @@ def flow_slopes(flow: RowFlow, x: Array, ends: Array, steps: Places, sets: Place
         moved[i] += _STEP * sizes[i]
         on, _ = flow(moved, steps, sets)
         slopes[:, :, :, i] = ((on - ends) / (_STEP * sizes[i])).transpose(2, 1, 0)
-    slopes[flow.rows.last[:-1]] = 0.0  # a run begins where it begins
-    return np.where(np.isfinite(slopes), slopes, 0.0)
+    return _within_runs(flow, slopes)
 
 
 def recursion(slopes: Array, added: Array) -> Array:
     """Return the solution of d[k + 1] = slopes[k] d[k] + added[k] from nothing, without the first.
 
-    In blocks that are gone through side by side, and then joined.
+    The unknowns one behind the other are those of a banded triangular system.
 
     Parameters
     ----------
@@ -202,22 +277,17 @@ def recursion(slopes: Array, added: Array) -> Array:
     -------
     of the shape of ``added``
     """
+    from scipy.linalg.lapack import dtbtrs
+
     n, sets, rows = added.shape
-    long = max(int(np.sqrt(rows)), 1)
-    blocks = -(-rows // long)
-    padded = np.zeros((blocks * long, slopes.shape[1], n, n))
-    padded[:rows] = slopes
-    A = padded.reshape(blocks, long, *padded.shape[1:])
-    b = np.zeros((blocks * long, sets, n, 1))
-    b[:rows, :, :, 0] = added.transpose(2, 1, 0)
-    b = b.reshape(blocks, long, sets, n, 1)
-    ways, alone = np.empty_like(A), np.empty_like(b)
-    ways[:, 0], alone[:, 0] = A[:, 0], b[:, 0]
-    for k in range(1, long):
-        np.matmul(A[:, k], ways[:, k - 1], out=ways[:, k])
-        alone[:, k] = A[:, k] @ alone[:, k - 1] + b[:, k]
-    begun = np.zeros((blocks, 1, sets, n, 1))
-    for k in range(1, blocks):
-        begun[k] = ways[k - 1, -1] @ begun[k - 1] + alone[k - 1, -1]
-    solved = (ways @ begun + alone).reshape(blocks * long, sets, n)[:rows]
-    return np.ascontiguousarray(solved.transpose(2, 1, 0))
+    right = np.ascontiguousarray(added.transpose(1, 2, 0)).reshape(sets, rows * n)
+    band = np.zeros(
+        (slopes.shape[1], rows, n, 2 * n)
+    )  # of every column, what stands on and under its diagonal
+    for j in range(n):
+        band[:, :-1, j, n - j : 2 * n - j] = -slopes[1:, :, :, j].transpose(1, 0, 2)
+    solved = np.empty_like(right)
+    for k, column in enumerate(band):
+        of = slice(k, k + 1) if len(band) > 1 else slice(None)
+        solved[of] = dtbtrs(column.reshape(rows * n, 2 * n).T, right[of].T, uplo="L", diag="U")[0].T
+    return np.ascontiguousarray(solved.reshape(sets, rows, n).transpose(2, 0, 1))

@@ -78,7 +78,7 @@ class Turning:
         ways = [own + force.way for force in acting[0].listed if force.way is not None]
         reaches = sizes.copy()
         reaches[ways] = np.inf  # nothing depends on where a way began
-        key = (tuple(runs), tuple(turning[0]))
+        key = (tuple(map(model.recorded, runs)), tuple(turning[0]))
         with silenced():
             first = self._led(flow, key, starts[:, :1], sizes, reaches)
             if first is None:
