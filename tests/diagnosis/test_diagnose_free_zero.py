@@ -38,6 +38,15 @@ def test_the_interval_holds_the_coefficient_and_no_zero_is_named_beside_it(tmp_p
     assert held >= least
 
 
+def test_the_one_recorded_temperature_is_the_temperature_whatever_its_name(tmp_path):
+    frames = {f"r{run}__csv": recording(0, run).rename(columns={"T": "ofen"}) for run in range(2)}
+    text = cell_case(0.002, ofen="degC") + TWO
+    made = diagnose(read_case(write_case(tmp_path, text, simulator=CELL, **frames)), None).diagnosis
+    assert [(effect.name, effect.channel) for effect in made.effects] == [("thermal_drift", "F")]
+    low, high = made.effects[0].parameters[0].ci95
+    assert low < COEFFICIENT < high
+
+
 def test_a_drift_is_seen_beside_a_zero_that_is_larger_than_all_that_it_does(tmp_path):
     """Zeroed at 70 degC, recorded between 20 and 25: counted from the first row the drift is unlike."""
     frames = {f"r{run}__csv": recording(7, run, zeroed=70.0) for run in range(2)}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.simulators.parameter_units import channel_unit
+from toolkit.diagnosis.simulators.setting import known_names
 from toolkit.effects.surroundings import MotionSizes
 from toolkit.errors import UnitError
 from toolkit.units import is_unit, unit
@@ -127,7 +128,8 @@ class CaseView:
 
     def recorded_range(self, *names: str) -> float:
         """Return the range of the first of these channels that was recorded, 1 where none was."""
-        for name in names:
+        known = known_names(self._problem.case)
+        for name in (known.get(name, name) for name in names):
             columns = [run.columns[name] for run in self._problem.runs if name in run.columns]
             if columns:
                 return float(np.ptp(np.concatenate(columns)))

@@ -18,7 +18,7 @@ from toolkit.diagnosis.simulators.channels import (
     true_inputs,
 )
 from toolkit.diagnosis.simulators.motion import Motion, motion_of
-from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, nominal_load, setting
+from toolkit.diagnosis.simulators.setting import NOMINAL_SPEED, known_names, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output
 from toolkit.diagnosis.simulators.tire import slip_work_before, tire_places
 from toolkit.effects.applied import AppliedEffect
@@ -130,7 +130,7 @@ class AlongRecordings(ABC):
         if not self.is_tire:
             found += input_places(effect, [pair for pair in others if pair[0] in self.inputs])
         outputs = [(output.name, output.unit) for output in self.outputs]
-        return found + channel_places(effect, outputs, others, self.drivers)
+        return found + channel_places(effect, outputs, others, set(known_names(self.case)))
 
     def setting(self, run: Run) -> Setting:
         """Return a run's setting."""

@@ -24,7 +24,7 @@ from toolkit.diagnosis.simulators.ode_following import followed
 from toolkit.diagnosis.simulators.ode_responses import pushed
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
-from toolkit.diagnosis.simulators.setting import is_speed, nominal_load, setting
+from toolkit.diagnosis.simulators.setting import is_speed, known_names, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
 from toolkit.diagnosis.simulators.states import (
     declared_dimensions,
@@ -452,7 +452,6 @@ class OdeModel:
 
     def places(self, effect: Effect) -> list[tuple[str | None, str | None]]:
         """Return the states and outputs on which an effect could act."""
-        drivers = set(self.drivers)
         if effect.term is not None:
             if is_law(effect.name):
                 return [(state, None) for state in term_places(self.places)]
@@ -463,7 +462,10 @@ class OdeModel:
             return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, meanings)]
         others = [(driver.name, driver.unit) for driver in self.case.drivers]
         found = channel_places(
-            effect, [(output.name, output.unit) for output in self.outputs], others, drivers
+            effect,
+            [(output.name, output.unit) for output in self.outputs],
+            others,
+            set(known_names(self.case)),
         )
         return found + input_places(effect, [pair for pair in others if pair[0] in self._inputs])
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from toolkit.diagnosis.simulators.channels import channel_places, input_places
 from toolkit.diagnosis.simulators.following import Followed, following_shapes, padded
+from toolkit.diagnosis.simulators.setting import known_names
 from toolkit.diagnosis.simulators.simulator import (
     Capability,
     Following,
@@ -97,7 +98,7 @@ class OdeApart:
             outputs = [(output.name, output.unit) for output in self.outputs]
             drivers = [(driver.name, driver.unit) for driver in self.case.drivers]
             inputs = [(driver.name, driver.unit) for driver in self.case.drivers if driver.role == "input"]
-            found = channel_places(effect, outputs, drivers, {name for name, _ in drivers})
+            found = channel_places(effect, outputs, drivers, set(known_names(self.case)))
             return found + input_places(effect, inputs)
         if is_law(effect.name):
             return [(state, None) for state in term_places(self.places)]

@@ -22,6 +22,21 @@ SPEEDS = frozenset({"speed", "frequency"})
 _NOMINAL_LOADS = frozenset({"FZ0", "FZNOM", "FZNOMINAL", "FNOMIN", "FNOM", "NOMINALLOAD"})
 
 
+def known_names(case: Case) -> dict[str, str]:
+    """Return the channels of a case by the names under which effects look for them.
+
+    The one covariate that is a temperature is that of the cells, whatever a user calls it. An input is none:
+    it is what the simulation is about.
+    """
+    names = {channel.name: channel.name for channel in case.drivers}
+    warmths = [each.name for each in case.drivers if each.role == "covariate" and _is_warmth(each.unit)]
+    return names if len(warmths) != 1 else {"T_CELL": warmths[0]} | names
+
+
+def _is_warmth(text: str) -> bool:
+    return dimension(text) == dimension("K")
+
+
 def si(case: Case, name: str, values: Array) -> Array:
     """Return a channel's values in SI."""
     stated = unit(case.unit(name))
@@ -32,17 +47,14 @@ def setting(
     case: Case, run: Run, *, nominal_load_N: float, speed_m_s: float = NOMINAL_SPEED, work_kJ: float = 0.0
 ) -> Setting:
     """Return the setting of a run; its channels are all drivers, in SI."""
+    names = known_names(case)
     channels = {
-        channel.name: si(case, channel.name, run.columns[channel.name])
-        for channel in case.drivers
-        if channel.name in run.columns
+        known: si(case, name, run.columns[name]) for known, name in names.items() if name in run.columns
     }
     first = {}
-    for channel in case.drivers:
-        source = next((r for r in case.runs if channel.name in r.columns), run)
-        first[channel.name] = (
-            float(si(case, channel.name, source.columns[channel.name])[0]) if source.rows else 0.0
-        )
+    for known, name in names.items():
+        source = next((r for r in case.runs if name in r.columns), run)
+        first[known] = float(si(case, name, source.columns[name])[0]) if source.rows else 0.0
     return Setting(
         t=run.t,
         elapsed_s=elapsed(case, run),
