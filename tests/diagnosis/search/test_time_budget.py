@@ -13,6 +13,8 @@ from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.simulators.case_code import CaseCode
 from toolkit.worker.worker import LateError
 
+pytestmark = pytest.mark.usefixtures("case_worker")  # a worker that is late is ended
+
 WAITS = SIMULATOR.replace("import pandas as pd", "import pandas as pd, time\n    WAIT")
 DRIVEN = """
 import numpy as np
