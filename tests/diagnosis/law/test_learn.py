@@ -208,7 +208,13 @@ def test_of_noise_no_law_is_learned(tmp_path):
     assert answer["fit"]["held_out"][0]["with_laws_rmse"] is None
 
 
-@pytest.mark.parametrize(("spent", "skipped"), [(0.5, ()), (0.8, ("step 1: pairs of candidates",))])
+PAIRS = pytest.mark.campaign("half of the time is left, and pairs are begun: that of laws is theirs in every run")
+
+
+@pytest.mark.parametrize(
+    ("spent", "skipped"),
+    [pytest.param(0.5, (), marks=PAIRS), (0.8, ("step 1: pairs of candidates",))],
+)
 def test_laws_are_learned_though_the_time_of_pairs_is_over(monkeypatch, tmp_path, spent, skipped):
     """What explains the most here is a law, and pairs before it may be as dear as all single effects."""
     begun: list[float] = []
