@@ -1,14 +1,12 @@
-"""Diagnoses whose simulators run in this process, and what competes in one where its names are not asked."""
+"""Diagnoses whose simulators run in this process."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
 from toolkit.diagnosis.diagnose import diagnose
-from toolkit.diagnosis.search import search
-from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.simulators.case_code import WORKER_LIMITS
 
 
@@ -27,17 +25,3 @@ def _in_this_process() -> Iterator[None]:
 def case_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a case's code run in its worker, as in the laboratory."""
     monkeypatch.setitem(diagnose.__kwdefaults__, "limits", WORKER_LIMITS)
-
-
-@pytest.fixture
-def among(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Have the search choose among effects of these names; of none where laws alone are asked."""
-
-    def choose(*names: str) -> None:
-        monkeypatch.setattr(
-            search,
-            "candidates",
-            lambda problem: tuple(each for each in candidates(problem) if each.name in names),
-        )
-
-    return choose

@@ -208,7 +208,9 @@ def test_of_noise_no_law_is_learned(tmp_path):
     assert answer["fit"]["held_out"][0]["with_laws_rmse"] is None
 
 
-PAIRS = pytest.mark.campaign("half of the time is left, and pairs are begun: that of laws is theirs in every run")
+PAIRS = pytest.mark.campaign(
+    "half of the time is left, and pairs are begun: that of laws is theirs in every run"
+)
 
 
 @pytest.mark.parametrize(

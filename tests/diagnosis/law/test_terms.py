@@ -144,9 +144,8 @@ def test_a_law_of_an_input_and_a_state_is_learned(tmp_path):
     assert fit["refitted_rmse"] > 0.02
 
 
-def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path, among):
+def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path):
     # A wrong sensitivity of the force takes most of its square's answer, and the law takes all of it.
-    among("sensitivity_error")
     answer = _diagnosed(tmp_path, HIDDEN["a force that grows with its square"])
     assert (answer["verdict"], answer["effects"]) == ("unknown", [])
     (law,) = answer["laws"]
