@@ -62,7 +62,7 @@ def test_a_pull_to_the_positive_side_is_positive_in_its_axes(tmp_path):
 
 
 def test_a_channel_that_is_late_has_a_positive_delay(tmp_path):
-    # Two rows late: of a row and a half, what rounds the step of FZ between its rows is learned as a law of FZ.
+    # Two rows late: of a row and a half, what rounds the step of FZ between its rows is learned as a law.
     made = found(python_tire(tmp_path, "ISO-W", delay=0.2))
     assert "channel_delay" in {made.name, *made.equivalent_to}
     if made.name == "channel_delay":

@@ -79,7 +79,7 @@ def _checkout() -> Sequence[Module]:
 
 
 def modules_of(root: Path = ROOT) -> Sequence[Module]:
-    """Return every module of the package in a checkout, read alone: a tree is parsed where it is asked for."""
+    """Return every module of the package in a checkout, read alone: a tree is parsed where one asks."""
     return _texts() if root == ROOT else _read(root)
 
 
