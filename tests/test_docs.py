@@ -173,7 +173,9 @@ def _paths(value: object, path: str = "") -> Iterator[str]:
 
 def test_the_page_has_the_keys_of_an_answer(tmp_path: Path) -> None:
     recordings = {f"r{seed}__csv": carriage(seed=seed, coulomb=0.0, drag=800.0) for seed in range(2)}
-    answer = json_value(diagnose(read_case(write_case(tmp_path, HEAD + TWO, **recordings)), None).diagnosis)
+    answer = json_value(
+        diagnose(read_case(write_case(tmp_path, HEAD + TWO, **recordings)), None, limits=None).diagnosis
+    )
     text = (DOCS / "case.md").read_text(encoding="utf-8").partition("| key |")[2]
     listed = set(re.findall(r"(?m)^\| `([^`]+)` \|", text))
     shown = {path for path in _paths(answer) if not path.startswith(("findings", "depends_on"))}
