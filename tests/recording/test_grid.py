@@ -37,7 +37,7 @@ from toolkit.recording.xlsx import read_sheet
 M15 = load_machine("m15")
 GOOD = table_xml([HEADERS, *DATA])
 quick = settings(
-    max_examples=200,
+    max_examples=80,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
