@@ -315,7 +315,7 @@ def test_any_small_change_of_the_sheet_has_one_answer(tmp_path, data):
 
 
 @pytest.mark.campaign("drawn tables: tables of every kind have one answer in every run")
-@quick
+@settings(quick, max_examples=200)
 @given(
     table=st.lists(
         st.lists(st.floats(-1e6, 1e6) | st.integers(-9, 9), min_size=7, max_size=7), min_size=1, max_size=8
