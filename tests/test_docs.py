@@ -64,14 +64,17 @@ def exists(name: str) -> bool:
     return False
 
 
+PRINTED = tuple(written())
+
+
 @pytest.mark.parametrize(("path", "present", "text"), [
-    pytest.param(*page, id=page[0].relative_to(DOCS).as_posix()) for page in written()
+    pytest.param(*page, id=page[0].relative_to(DOCS).as_posix()) for page in PRINTED
 ])  # fmt: skip
 def test_what_is_printed_from_the_code_is_up_to_date(path: Path, present: str, text: str) -> None:
     assert present == text, f"run make pages: {path.name} is not what the declarations say"
 
 
-@pytest.mark.parametrize("path", [page[0] for page in written()], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [page[0] for page in PRINTED], ids=lambda path: path.stem)
 def test_a_printed_page_begins_with_prose(path: Path) -> None:
     title, _, prose = path.read_text(encoding="utf-8").partition(GENERATED)[0].partition("\n")
     assert title.startswith("# ")
@@ -170,7 +173,9 @@ def _paths(value: object, path: str = "") -> Iterator[str]:
 
 def test_the_page_has_the_keys_of_an_answer(tmp_path: Path) -> None:
     recordings = {f"r{seed}__csv": carriage(seed=seed, coulomb=0.0, drag=800.0) for seed in range(2)}
-    answer = json_value(diagnose(read_case(write_case(tmp_path, HEAD + TWO, **recordings)), None).diagnosis)
+    answer = json_value(
+        diagnose(read_case(write_case(tmp_path, HEAD + TWO, **recordings)), None, limits=None).diagnosis
+    )
     text = (DOCS / "case.md").read_text(encoding="utf-8").partition("| key |")[2]
     listed = set(re.findall(r"(?m)^\| `([^`]+)` \|", text))
     shown = {path for path in _paths(answer) if not path.startswith(("findings", "depends_on"))}

@@ -19,6 +19,7 @@ import pytest
 
 from tests import commands
 from tests.calibration.registry.test_signatures import KEYS, RECORD, _found, _registry, _rewrite
+from tests.report.template_factory import make, p
 from tests.trust.seal.authority import to_pem
 from tests.trust.seal.seal_factory import authority, flipped, key, trust
 from toolkit.calibration.records.record import canonical
@@ -302,9 +303,8 @@ def test_an_issued_report_says_the_day_of_its_test_to_whoever_verifies_it(
     (home / "trust" / "certificates").mkdir(parents=True)
     (home / "trust" / "certificates" / "root.pem").write_bytes(authority().pem)
     (tmp_path / "key.pem").write_bytes(to_pem(key()))
-    code, answer = commands.answer(
-        "report", virtual_test, "--out", tmp_path / "out", "--home", home, "--seal", tmp_path / "key.pem"
-    )
+    words = ("--template", make(tmp_path, p("{{tk:test.name}}")), "--seal", tmp_path / "key.pem")
+    code, answer = commands.answer("report", virtual_test, "--out", tmp_path / "out", "--home", home, *words)
     assert code < 2, answer
     (line,) = [entry for entry in map(json.loads, _lines(home)) if entry["event"] == "issued"]
     assert line["document"]["tested"] == "2026-03-17"

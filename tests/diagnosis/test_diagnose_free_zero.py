@@ -22,10 +22,10 @@ def recording(draw, run, zeroed=18.5):
     return pd.DataFrame({"t": t, "L": load, "T": T, "F": force})
 
 
-LENGTH = pytest.mark.campaign("more draws of one recording: two of them show a wrong coefficient")
+LENGTH = pytest.mark.campaign("more draws of one recording: one of them shows a wrong coefficient")
 
 
-@pytest.mark.parametrize(("draws", "least"), [(2, 1), pytest.param(6, 5, marks=LENGTH)])
+@pytest.mark.parametrize(("draws", "least"), [(1, 1), pytest.param(6, 5, marks=LENGTH)])
 def test_the_interval_holds_the_coefficient_and_no_zero_is_named_beside_it(tmp_path, draws, least):
     held = 0
     for draw in range(draws):

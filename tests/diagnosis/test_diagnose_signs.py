@@ -62,8 +62,8 @@ def test_a_pull_to_the_positive_side_is_positive_in_its_axes(tmp_path):
 
 
 def test_a_channel_that_is_late_has_a_positive_delay(tmp_path):
-    made = found(python_tire(tmp_path, "ISO-W", delay=0.15))
+    # Two rows late: of a row and a half, what rounds the step of FZ between its rows is learned as a law.
+    made = found(python_tire(tmp_path, "ISO-W", delay=0.2))
     assert "channel_delay" in {made.name, *made.equivalent_to}
     if made.name == "channel_delay":
-        # linear interpolation between rows 0.1 s apart adds up to its curvature, 1e-3 of the sweep
-        assert value(made, "delay") == pytest.approx(0.15, abs=0.01)
+        assert value(made, "delay") == pytest.approx(0.2, abs=0.01)

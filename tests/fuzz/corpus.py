@@ -149,7 +149,7 @@ def _answer() -> Mapping[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         runs = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
         case = read_case(write_case(Path(folder), HEAD + TWO, simulator=SIMULATOR, **runs))
-        answer = {"schema": 1, **json_value(diagnose(case, None).diagnosis), "model": None}
+        answer = {"schema": 1, **json_value(diagnose(case, None, limits=None).diagnosis), "model": None}
     return {"diagnosis.json": json.dumps(answer).encode()}
 
 

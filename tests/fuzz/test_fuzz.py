@@ -11,7 +11,7 @@ from tests.fuzz.corpus import TARGETS
 from tests.fuzz.mutations import MUTATE, Recipe, apply
 from tests.fuzz.recipes import RECIPES
 
-SEED, INPUTS = 20, 8
+SEED, INPUTS = 20, 5
 NAMES = [target.name for target in TARGETS]
 
 

@@ -9,14 +9,15 @@ be written.
 from __future__ import annotations
 
 import ast
+import functools
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
 from tests.house import manual
-from tests.house.source import ROOT, read_package
+from tests.house.source import ROOT, modules_of
 from toolkit.characteristics.catalogue import characteristics
 from toolkit.cli.groups import declared_answers, declared_type
 from toolkit.cli.main import command_tree
@@ -32,21 +33,22 @@ from toolkit.report.kinds import VOCABULARIES
 GENERATED = "<!-- Written by `make pages` from here on: change the declarations, not this text. -->"
 
 
-def formats(root: Path = ROOT) -> list[type]:
+@functools.cache
+def formats(root: Path = ROOT) -> Sequence[type]:
     """Return the classes that declare a file, by title, found in the syntax trees of the package.
 
     A class with ``FORMAT`` declares one, unless it has no schema and is a table of another class with it.
     """
     classes = [
         getattr(import_module(module.name), node.name)
-        for module in read_package(root)
+        for module in modules_of(root)
         if "FORMAT: ClassVar" in module.text
         for node in module.tree.body
         if isinstance(node, ast.ClassDef) and any(_is_format(statement) for statement in node.body)
     ]
     inner = {table for cls in classes for table in _tables_below(cls)}
     files = (cls for cls in classes if cls not in inner or _form(cls).schema is not None)
-    return sorted(files, key=_title)
+    return tuple(sorted(files, key=_title))
 
 
 def _is_format(statement: ast.stmt) -> bool:

@@ -69,13 +69,23 @@ def _checkout() -> Sequence[Module]:
     # to parse them.
     collecting = gc.isenabled()
     gc.disable()
-    modules = _read(ROOT)
+    modules = _texts()
     for module in modules:
         _ = module.nodes
     gc.freeze()
     if collecting:
         gc.enable()
     return modules
+
+
+def modules_of(root: Path = ROOT) -> Sequence[Module]:
+    """Return every module of the package in a checkout, read alone: a tree is parsed where one asks."""
+    return _texts() if root == ROOT else _read(root)
+
+
+@functools.cache
+def _texts() -> Sequence[Module]:
+    return _read(ROOT)
 
 
 def _read(root: Path) -> Sequence[Module]:

@@ -37,7 +37,7 @@ from toolkit.recording.xlsx import read_sheet
 M15 = load_machine("m15")
 GOOD = table_xml([HEADERS, *DATA])
 quick = settings(
-    max_examples=200,
+    max_examples=80,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
@@ -315,7 +315,7 @@ def test_any_small_change_of_the_sheet_has_one_answer(tmp_path, data):
 
 
 @pytest.mark.campaign("drawn tables: tables of every kind have one answer in every run")
-@quick
+@settings(quick, max_examples=200)
 @given(
     table=st.lists(
         st.lists(st.floats(-1e6, 1e6) | st.integers(-9, 9), min_size=7, max_size=7), min_size=1, max_size=8

@@ -2,6 +2,7 @@
 
 import math
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,9 +10,13 @@ from tests.diagnosis.cases import HEAD, ONE, SIMULATOR, TWO, carriage, write_cas
 from toolkit.declared import json_value
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
+from toolkit.diagnosis.policy import BUDGET
+from toolkit.diagnosis.search import time_budget
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.diagnosis.simulators.case_code import CaseCode
 from toolkit.worker.worker import LateError
+
+pytestmark = pytest.mark.usefixtures("case_worker")  # a worker that is late is ended
 
 WAITS = SIMULATOR.replace("import pandas as pd", "import pandas as pd, time\n    WAIT")
 DRIVEN = """
@@ -43,6 +48,18 @@ def test_a_call_in_time_returns_and_leaves_no_alarm():
     time.sleep(0.4)
     with pytest.raises(BudgetSpentError, match="declared"):
         budget.guarded(lambda: None)()
+
+
+def test_a_step_that_others_wait_for_leaves_them_a_part_of_the_time(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(time_budget, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    budget = TimeBudget(600.0, lambda _: None, alarm=False)
+    now[0] = 0.5 * 600
+    budget.check("pairs", reserve=BUDGET.laws)
+    now[0] = 0.8 * 600
+    with pytest.raises(BudgetSpentError, match="pairs"):
+        budget.check("pairs", reserve=BUDGET.laws)
+    budget.check("laws")
 
 
 def test_a_simulator_of_ten_minutes_gives_a_partial_answer(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -92,13 +94,24 @@ def warm(
     return problem, bare, fit(problem, (constant,), start=bare.p)
 
 
+@pytest.fixture(scope="module")
+def warmed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., tuple[Problem, Fit, Fit]]:
+    """Return bodies and their fits, recorded once for all that look at them."""
+
+    @functools.cache
+    def recorded(**how: float) -> tuple[Problem, Fit, Fit]:
+        return warm(tmp_path_factory.mktemp("warm"), **how)
+
+    return recorded
+
+
 @pytest.mark.parametrize(
     ("heat", "stirred", "is_one"), [(0.0, 0.02, False), (0.0015, 0.0, True), (0.01, 0.01, True)]
 )
 def test_a_constant_is_one_where_it_is_more_than_the_mean_of_what_wanders(
-    tmp_path: Path, heat: float, stirred: float, is_one: bool
+    warmed: Callable[..., tuple[Problem, Fit, Fit]], heat: float, stirred: float, is_one: bool
 ) -> None:
-    problem, bare, made = warm(tmp_path, heat=heat, stirred=stirred)
+    problem, bare, made = warmed(heat=heat, stirred=stirred)
     assert may_wander(problem, made.active[0])
     assert made.log_posterior - bare.log_posterior > 15  # to free simulations it is one each time
     assert outdoes_wandering(problem, bare, made) is is_one
@@ -116,9 +129,9 @@ def test_a_zero_of_a_sensor_is_one_where_it_is_more_than_what_wanders(
 
 @pytest.mark.parametrize(("heat", "stirred", "named"), [(0.0, 0.02, 0), (0.0015, 0.0, 1)])
 def test_the_mean_of_what_wanders_is_no_step_and_no_name(
-    tmp_path: Path, heat: float, stirred: float, named: int
+    warmed: Callable[..., tuple[Problem, Fit, Fit]], heat: float, stirred: float, named: int
 ) -> None:
-    problem, bare, made = warm(tmp_path, heat=heat, stirred=stirred)
+    problem, bare, made = warmed(heat=heat, stirred=stirred)
     folds = folds_of(problem, bare)
     before, unseen = hold_out(problem, folds, (), bare), hold_out(problem, folds, made.active, made)
     steps = [Step(active=made.active[0], p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=())]

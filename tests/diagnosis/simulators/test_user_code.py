@@ -16,6 +16,8 @@ from toolkit.diagnosis.simulators.ode import OdeModel
 from toolkit.diagnosis.simulators.python import PythonModel
 from toolkit.errors import ConfigError, FitError
 
+pytestmark = pytest.mark.usefixtures("case_worker")  # others' code may exit, read the terminal, or print
+
 START = "import numpy as np\nimport pandas as pd\ndef simulate(inputs, p):\n    "
 
 

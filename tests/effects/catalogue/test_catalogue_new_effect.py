@@ -70,7 +70,7 @@ def test_a_case_is_searched_for_it_and_names_it(tension_gain, tmp_path):
         one for one in candidates(problem_of(case, model_of(case, None))) if one.name == "tension_gain"
     )
     assert (listed.active.channel, len(listed.starts)) == ("F", 1)
-    answer = diagnose(case, None).diagnosis
+    answer = diagnose(case, None, limits=None).diagnosis
     assert [effect.name for effect in answer.effects] == ["tension_gain"]
     low, high = answer.effects[0].parameters[0].ci95
     assert low < 0.05 < high

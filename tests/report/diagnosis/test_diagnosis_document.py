@@ -27,7 +27,7 @@ DAY = dt.date(2026, 4, 1)
 def made_of(folder: Path, *, drag: float) -> tuple[Any, Any]:
     seen = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=drag) for i in range(2)}
     case = read_case(write_case(folder, HEAD + TWO, **seen))
-    return case, diagnose(case, None)
+    return case, diagnose(case, None, limits=None)
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ from toolkit.report.style import Style
 @pytest.fixture(scope="module")
 def dragged(tmp_path_factory):
     files = {f"r{i}__csv": carriage(seed=i, coulomb=0.0, drag=800.0) for i in range(2)}
-    return diagnose(read_case(write_case(tmp_path_factory.mktemp("case"), **files)), None)
+    return diagnose(read_case(write_case(tmp_path_factory.mktemp("case"), **files)), None, limits=None)
 
 
 def words_of(result):
@@ -224,7 +224,7 @@ def simulate(inputs, p):
     read = read_case(
         write_case(tmp_path, toml, simulator=simulator, r0__csv=pd.DataFrame({"t": days, "y": y}))
     )
-    result = diagnose(read, None)
+    result = diagnose(read, None, limits=None)
     places = [at for one in result.diagnosis.mismatch for at in one.where if at.variable == "time"]
     assert places
     assert all(at.unit == "day" and 0 <= at.start < at.end <= 99 for at in places)
