@@ -10,8 +10,8 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy import stats
 import statsmodels.api as sm
+from scipy import stats
 from statsmodels.robust.scale import Huber
 
 from toolkit.comparison.laboratories import (

@@ -53,7 +53,7 @@ def test_the_mean_of_an_autoregression_has_its_known_variance(rho):
 
 @pytest.mark.parametrize("n", [21, 39])
 def test_the_mean_of_few_rows_that_repeat_each_other_is_covered(n):
-    # Three repeats of 7 or 13 steps. Taken for white, a mean of AR(0.9) lies in its interval in half of the cases.
+    # Three repeats of 7 or 13 steps. Taken for white, every other mean of AR(0.9) would lie outside.
     rng = np.random.default_rng(n)
     means, noise = judged(np.ones((1, n)), autoregression(rng, 0.9, (1000, n)))
     said = noise.variance / n

@@ -304,11 +304,11 @@ def method_precision(results: Sequence[Results]) -> MethodPrecision:
 def cochran_p(results: Sequence[Results]) -> tuple[str, float] | None:
     """Return the laboratory that scatters most and the p value of Cochran's test; None without repeats.
 
-    C = SS_i / sum SS, the laboratory's share of the sum of squares within laboratories; of n results each that
-    is the standard's s_i^2 / sum s^2 (ISO 5725-2, 7.3.3). P(C) is that of F = C (N - n) / ((1 - C) n) with n
-    and N - n degrees of freedom, n of the laboratory and N of all; p of the least likely is P times the
-    laboratories with repeats. For different numbers of results the standard takes the most common one for
-    all: of a laboratory with two results among such with five every tenth sound comparison was an outlier.
+    C = SS_i / sum SS is a laboratory's share of the sum of squares within laboratories; of equal numbers of
+    results it is the standard's s_i^2 / sum s^2 (ISO 5725-2, 7.3.3). P(C) is that of C (N - n) / (n (1 - C))
+    in F with n and N - n degrees of freedom, n of the laboratory and N of all; p is the least P times the
+    number of laboratories with repeats. For different numbers the standard takes the most common one for
+    all: of two results beside many of five every tenth sound comparison would have an outlier at 1 %.
     """
     from scipy.special import fdtrc
 
