@@ -11,6 +11,7 @@ import warnings
 import numpy as np
 import pytest
 import statsmodels.api as sm
+from scipy import stats
 from statsmodels.robust.scale import Huber
 
 from toolkit.comparison.laboratories import (
@@ -97,6 +98,37 @@ def test_cochran_has_the_standards_critical_values(p: int, n: int, one: float, f
         assert found is not None
         assert found[0] == "1"
         assert found[1] == pytest.approx(level, rel=0.08)
+
+
+def test_cochran_of_two_laboratories_is_the_f_test_of_their_variances() -> None:
+    """Of two and of six results the larger variance is on 1 and 5 degrees of freedom, whichever has it."""
+    unit = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]) * math.sqrt(5 / 6)  # variance 1
+    for ratio, wild, dofs in ((9.0, "few", (1, 5)), (40.0, "many", (5, 1))):
+        few, many = (ratio, 1.0) if wild == "few" else (1.0, ratio)
+        results = [
+            Results(laboratory="few", values=(0.0, math.sqrt(2 * few))),
+            Results(laboratory="many", values=tuple((unit * math.sqrt(many)).tolist())),
+        ]
+        found = cochran_p(results)
+        assert found is not None
+        assert found[0] == wild
+        assert found[1] == pytest.approx(2 * stats.f.sf(ratio, *dofs))
+
+
+@pytest.mark.parametrize("sizes", [(2, 2, 3, 5, 6, 6, 6, 6, 9), (2, 2, 2, 5, 5, 5, 5), (2, 2, 2, 2, 2, 8, 8)])
+def test_cochran_names_one_sound_comparison_of_a_hundred_whatever_its_numbers(sizes: tuple[int, ...]) -> None:
+    """Of 1000 sound comparisons 10 are expected; 3 to 20 hold 99.6 % of a binomial with p = 0.01."""
+    rng = np.random.default_rng(11)
+    named = 0
+    for _ in range(1000):
+        found = cochran_p(
+            [
+                Results(laboratory=str(i), values=tuple(rng.normal(size=n).tolist()))
+                for i, n in enumerate(sizes)
+            ]
+        )
+        named += found is not None and found[1] < 0.01
+    assert 3 <= named <= 20
 
 
 FIVE = [

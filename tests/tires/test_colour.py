@@ -51,6 +51,20 @@ def test_the_mean_of_an_autoregression_has_its_known_variance(rho):
     assert 0.93 <= share <= 0.97
 
 
+@pytest.mark.parametrize("n", [21, 39])
+def test_the_mean_of_few_rows_that_repeat_each_other_is_covered(n):
+    # Three repeats of 7 or 13 steps. Taken for white, every other mean of AR(0.9) would lie outside.
+    rng = np.random.default_rng(n)
+    means, noise = judged(np.ones((1, n)), autoregression(rng, 0.9, (1000, n)))
+    said = noise.variance / n
+    factor = np.array([coverage_factor(dof) for dof in noise.dof])
+    said[noise.coloured] = 1.0 / noise.information[:, 0, 0]
+    factor[noise.coloured] = np.array(
+        [coverage_factor(dof) for dof in noise.dof_of(np.ones((len(noise.coloured), 1, 1)))[:, 0]]
+    )
+    assert np.mean(np.abs(means[:, 0]) <= factor * np.sqrt(said)) >= 0.93
+
+
 def test_a_padded_curve_is_judged_as_it_is_alone():
     rng = np.random.default_rng(8)
     columns = np.stack([np.ones(120), np.linspace(-1, 1, 120), np.sin(np.arange(120) / 9)])
@@ -81,13 +95,13 @@ def test_every_quantity_has_the_variance_and_the_degrees_of_its_own_frequency():
 
 def test_white_noise_and_few_rows_keep_the_classical_variance():
     rng = np.random.default_rng(6)
-    for n, many in ((30, 40), (300, 40)):
+    for n, many in ((15, 40), (30, 40), (300, 40)):
         columns = np.stack([np.ones(n), np.linspace(-1, 1, n)])
         y = rng.normal(0, 1, (many, n))
         _, noise = judged(columns, y)
         _, _, cost = fitted(columns, y)
         white = np.setdiff1d(np.arange(many), noise.coloured)
-        assert len(white) == many if n < 40 else len(white) > 0.7 * many
+        assert len(white) == many if n < 18 else len(white) > 0.7 * many
         assert noise.variance[white] == pytest.approx(cost[white] / (n - 2))
         assert np.all(noise.dof[white] == n - 2)
         assert np.all(noise.time[white] == 1)

@@ -321,3 +321,14 @@ def test_the_answer_is_the_same_from_run_to_run():
     first, second = (fit_global(find("pacejka94"), table(0.004), predict=False) for _ in range(2))
     assert np.array_equal(first.values, second.values)
     assert first.fits == second.fits
+
+
+def test_the_nominal_load_does_not_depend_on_how_a_load_is_rounded_or_held():
+    """Of 1500, 3000, 4500, 6000 N two are equally near the middle: it is the smaller one in every unit."""
+    SA = np.radians(np.tile([-4.0, -1.0, 0.0, 1.0, 4.0], 4))
+    loads = np.repeat([1500.0, 3000.0, 4500.0, 6000.0], 5)
+    rng = np.random.default_rng(2)
+    for unit in (1.0, 4.4482216152605, 9.80665):
+        for held in (loads, loads * (1 + rng.normal(0, 5e-4, 20))):
+            data = measured({"SA": SA, "FZ": held / unit * unit, "FY": -SA * loads}, axes="SAE")
+            assert data.rows.FNOMIN == pytest.approx(3000, rel=2e-3)

@@ -302,29 +302,28 @@ def method_precision(results: Sequence[Results]) -> MethodPrecision:
 
 
 def cochran_p(results: Sequence[Results]) -> tuple[str, float] | None:
-    """Return the laboratory of the largest variance and the p value of Cochran's C; None without repeats.
+    """Return the laboratory that scatters most and the p value of Cochran's test; None without repeats.
 
-    C = s_max^2 / sum s^2 of p laboratories with n results each; p <= p P(F > C (p - 1) / (1 - C)) with
-    n - 1 and (p - 1)(n - 1) degrees of freedom (ISO 5725-2, 7.3.3). Of different numbers the most common is
-    taken for n, as the standard says.
+    C = SS_i / sum SS is a laboratory's share of the sum of squares within laboratories; of equal numbers of
+    results it is the standard's s_i^2 / sum s^2 (ISO 5725-2, 7.3.3). P(C) is that of C (N - n) / (n (1 - C))
+    in F with n and N - n degrees of freedom, n of the laboratory and N of all; p is the least P times the
+    number of laboratories with repeats. For different numbers the standard takes the most common one for
+    all: of two results beside many of five every tenth sound comparison would have an outlier at 1 %.
     """
     from scipy.special import fdtrc
 
-    sizes = [len(entry.values) for entry in results if len(entry.values) > 1]
     repeated = [entry for entry in results if len(entry.values) > 1]
-    if len(repeated) < 2:
+    squares = [float(np.sum(deviations(entry.values) ** 2)) for entry in repeated]
+    if len(repeated) < 2 or not any(squares):
         return None
-    variances = np.array(
-        [float(np.sum(deviations(entry.values) ** 2)) / (len(entry.values) - 1) for entry in repeated]
-    )
-    if not variances.any():
-        return None
-    n, p = max(set(sizes), key=lambda size: (sizes.count(size), size)), len(repeated)
-    C = float(variances.max() / variances.sum())
-    place = int(np.argmax(variances))
-    F = math.inf if C >= 1 else C * (p - 1) / (1 - C)
-    chance = 0.0 if math.isinf(F) else float(p * fdtrc(n - 1, (p - 1) * (n - 1), F))
-    return repeated[place].laboratory, min(1.0, chance)
+    dofs = [len(entry.values) - 1 for entry in repeated]
+    N, total = sum(dofs), math.fsum(squares)
+    chances = [
+        0.0 if square >= total else float(fdtrc(n, N - n, square * (N - n) / ((total - square) * n)))
+        for n, square in zip(dofs, squares, strict=True)
+    ]
+    place = int(np.argmin(chances))
+    return repeated[place].laboratory, min(1.0, len(repeated) * chances[place])
 
 
 def _findings(measurand: Measurand, reference: str | None) -> list[Finding]:

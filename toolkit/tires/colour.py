@@ -27,7 +27,8 @@ from toolkit.arrays import Array
 # The autocorrelation of a fit's residuals: by how many rows they repeat themselves.
 
 
-ROWS = 40  # fewer rows give noise for an estimate
+ROWS = 40  # fewer rows give noise for an estimate of one time
+_FEWEST = 18  # rows for the weights of all coefficients: three to each parameter of a curve
 _SHARE = 8.0  # rows that an estimate of so many repeated rows takes at least
 RHO = np.linspace(0.0, 0.98, 50)
 
@@ -162,7 +163,7 @@ def noise_of(residual: Array, columns: Array, lengths: NDArray[np.intp], cost: A
     total = np.vecdot(r, r)
     first = np.vecdot(r[:, 1:], r[:, :-1]) / np.where(total > 0, total, 1.0)
     root = 1.0 / np.sqrt(lengths)
-    coloured = np.flatnonzero((lengths >= ROWS) & (total > 0) & (first >= root - p / lengths))
+    coloured = np.flatnonzero((lengths >= _FEWEST) & (total > 0) & (first >= root - p / lengths))
     if not len(coloured):
         return Noise(
             variance=variance, dof=dof, time=time, coloured=coloured,

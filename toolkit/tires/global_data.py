@@ -64,6 +64,7 @@ def loaded_blocks(load: Array, SA: Array) -> tuple[NDArray[np.intp], ...]:
 
 CHANNELS = ("FX", "FY", "MZ")
 _NO_LOAD = 1.0  # N: a block below stands in the air
+_HELD = 0.01  # of the load
 _FEW = 3  # distinct values that a square needs
 _CAMBER, _ANGLE = np.radians(0.5), np.radians(0.5)
 _PRESSURE, _SPEED, _SLIP, _LOAD = 0.05, 0.10, 0.01, 0.2  # relative, but for the slip
@@ -136,8 +137,8 @@ def measured(
 ) -> Measured:
     """Return rows from columns in SI (FX FY MZ, SA FZ, optional IA P V KAPPA), blocks without load left out.
 
-    FNOMIN is the rated load, else the mean load of the block nearest the middle of the range; NOMPRES
-    and LONGVL are the medians of what was recorded.
+    FNOMIN is the rated load, else the mean load of the block nearest the middle of the range, the smaller of
+    two that are equally near; NOMPRES and LONGVL are the medians of what was recorded.
     """
     FZ = columns["FZ"]
     blocks = loaded_blocks(FZ, columns["SA"])
@@ -147,7 +148,10 @@ def measured(
         number[block] = index
     loads = np.array([FZ[block].mean() for block in blocks])
     middle = (loads.min() + loads.max()) / 2 if len(loads) else 1.0
-    nominal = rated_load_N or (float(loads[np.argmin(np.abs(loads - middle))]) if len(loads) else 1.0)
+    apart = np.abs(loads - middle)
+    # Neither how a load is held nor the rounding of its unit must choose between two of them.
+    nearest = apart <= apart.min(initial=np.inf) + _HELD * middle
+    nominal = rated_load_N or (float(loads[np.argmax(nearest)]) if len(loads) else 1.0)
     pressure, speed = columns.get("P"), columns.get("V")
     rows = make_rows(
         columns["SA"][loaded],

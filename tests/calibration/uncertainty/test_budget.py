@@ -222,3 +222,20 @@ def test_rounding_is_up_where_it_would_lower_by_more_than_a_twentieth() -> None:
     assert (round_uncertainty(0.0), round_uncertainty(math.nan)) == ("0", "not determined")
     with pytest.raises(ValueError):
         round_uncertainty(1.0, digits=3)
+
+
+@pytest.mark.parametrize("grows", [True, False])
+def test_a_reading_scatters_as_the_rows_near_its_load_show(grows: bool) -> None:
+    """A noise of 0.02 + 0.5 F/FS, and one of 0.3 everywhere: repeatability at both ends of the curve.
+
+    Of a variance known to some twenty rows near an end the standard deviation is known to 15 %: two of them.
+    """
+    rng = np.random.default_rng(5)
+    load, run, direction = levels(runs=6)
+    true = 0.02 + 0.5 * load / load.max() if grows else np.full(len(load), 0.3)
+    table = table_of((load - rng.normal(0, 1, len(load)) * true) / 500, load, run=run, direction=direction)
+    record = record_of_table(table)
+    at_end = calibration_budget(record, table, None, "F", float(load.max())).component("repeatability").u
+    at_zero = calibration_budget(record, table, None, "F", 0.0).component("repeatability").u
+    assert at_end == pytest.approx(0.52 if grows else 0.3, rel=0.3)
+    assert at_zero < 0.1 if grows else at_zero == pytest.approx(0.3, rel=0.3)

@@ -66,7 +66,13 @@ class Profile:
 
 
 def shown_profile(columns: Mapping[str, Array], residuals: Array) -> Array | None:
-    """Return each row's standard deviation (rows,) where residuals show that it grows; else None.
+    """Return each row's standard deviation (rows,) where residuals show that it grows; else None."""
+    profile = profile_of_residuals(columns, residuals)
+    return None if profile is None else np.asarray(np.sqrt(profile.at(columns)))
+
+
+def profile_of_residuals(columns: Mapping[str, Array], residuals: Array) -> Profile | None:
+    """Return how the scatter grows where residuals (rows,) show that it does; else None.
 
     They show it where their squares follow the indications beyond chance: n R^2 of that regression by
     chi-square (Koenker, J. Econometrics 17 (1981) 107).
@@ -84,5 +90,4 @@ def shown_profile(columns: Mapping[str, Array], residuals: Array) -> Array | Non
     explained = float(np.sum((q.T @ about) ** 2) / (about @ about))
     if chdtrc(count, n * explained) >= _RISK:
         return None
-    profile = Profile.of(columns, squares, _LEAST**2 * float(squares.mean()))
-    return np.asarray(np.sqrt(profile.at(columns)))
+    return Profile.of(columns, squares, _LEAST**2 * float(squares.mean()))

@@ -163,7 +163,8 @@ def _repeatability(s: Scatter, reading: float) -> Component:
     if runs.correlation > 0:
         text += f", correlated by {runs.correlation:.2f} from row to row"
     if s.profile is not None:
-        text += ", as the rows' stated uncertainties have it at this point"
+        shown = "the residuals show" if s.rows.noise is None else "the rows' stated uncertainties have"
+        text += f", as {shown} it at this point"
     if not s.misfit_dof:
         text += "; it holds the misfit of the curve, which so few rows cannot tell apart"
     dof = s.dof(_READING, runs.within**2)

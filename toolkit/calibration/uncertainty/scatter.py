@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.calibration.fit.profile import Profile
+from toolkit.calibration.fit.profile import Profile, profile_of_residuals
 from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
 from toolkit.calibration.fit.run_scatter import estimate, spread
@@ -33,8 +33,8 @@ class Scatter:
 
     ``runs`` are the components within and between runs, with one group where one run tells nothing of the
     next; ``profile`` is the variance of a reading by that of ``runs.within`` at any point, where rows weigh
-    unlike, else None; ``spread`` (4, 4) the covariance of their estimates; ``rows`` how they reach the
-    coefficients.
+    unlike or their residuals show that they scatter unlike, else None; ``spread`` (4, 4) the covariance of
+    their estimates; ``rows`` how they reach the coefficients.
     ``reversal`` is half the root mean square difference of the directions, ``misfit`` the root mean square
     distance from the curve of what a smooth one through the rows would be.
     """
@@ -84,17 +84,20 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
         covariance = np.diag([*(2 * runs.variances**2 / [runs.dof, between, between]), 0.0])
     misfit = _explained(rows, runs, rows.mean.misfit)
     reversal = _explained(rows, runs, rows.mean.direction)
+    weighed = weighed_rows(
+        design,
+        load,
+        groups_of(loads, record.zero, every=every)[1],
+        noise,
+        rounding=rounding_of(record, fitted, loads),
+    )
+    residuals = load - design @ np.asarray(fitted.coefficients)
+    residuals = residuals - weighed.of_runs(runs, residuals)
     return Scatter(
         runs=runs,
         spread=covariance,
-        rows=weighed_rows(
-            design,
-            load,
-            groups_of(loads, record.zero, every=every)[1],
-            noise,
-            rounding=rounding_of(record, fitted, loads),
-        ),
-        profile=None if noise is None else _profile(record, loads, noise),
+        rows=weighed,
+        profile=_shown(record, loads, residuals) if noise is None else _profile(record, loads, noise),
         misfit=misfit[0],
         misfit_dof=misfit[1],
         reversal=reversal[0],
@@ -105,6 +108,12 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
 def _profile(record: CalibrationRecord, loads: Table, noise: RowNoise) -> Profile:
     squares = noise.profile**2
     return Profile.of(loads.columns(record.indications), squares, float(squares.min()))
+
+
+def _shown(record: CalibrationRecord, loads: Table, residuals: Array) -> Profile | None:
+    """Return the profile that residuals show, of mean one as the scatter within runs is that of all rows."""
+    size = float(np.sqrt(np.mean(residuals**2))) or 1.0
+    return profile_of_residuals(loads.columns(record.indications), residuals / size)
 
 
 def _one_run(rows: SessionRows) -> RunScatter:
