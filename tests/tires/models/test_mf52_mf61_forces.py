@@ -8,8 +8,6 @@ import pytest
 from toolkit.tires.mf import equivalent
 from toolkit.tires.models import mf52, mf61
 from toolkit.tires.slip import state
-from toolkit.tires.tir import parse_tir
-from toolkit.tires.tir_evaluate import evaluate_tir
 
 F0, R0 = 4000.0, 0.3
 P = {
@@ -218,21 +216,3 @@ def test_equivalent_slip_keeps_sign_and_grows_with_kappa():
     joined = equivalent(slips, np.asarray(1.0), np.full(5, 0.4))
     assert np.all(np.abs(joined) >= np.abs(slips))
     assert joined[3] == pytest.approx(math.atan(math.hypot(math.tan(0.5), 0.4)))
-
-
-@pytest.mark.parametrize(("fittyp", "over"), [(52, 1.0), (61, 1.25)])
-def test_the_nominal_load_of_trail_and_arm(fittyp, over):
-    """With QCZ1 = 0 the trail is FZ R0 QDZ1 cos(alpha) over F_z0 (MF 5.2, 50) or LFZO F_z0 (6.x, 4.E42)."""
-    text = (
-        f"[MODEL]\nFITTYP = {fittyp}\n[DIMENSION]\nUNLOADED_RADIUS = 0.3\n[VERTICAL]\nFNOMIN = 4000\n"
-        "[SCALING_COEFFICIENTS]\nLFZO = 1.25\n[LATERAL_COEFFICIENTS]\nPCY1 = 1.3\nPDY1 = 1\nPKY1 = -20\n"
-        "PKY2 = 1.6\n[LONGITUDINAL_COEFFICIENTS]\nPCX1 = 1.6\nPDX1 = 1\nPKX1 = 20\n"
-        "[ALIGNING_COEFFICIENTS]\nQCZ1 = 0\nQBZ1 = 9\nQDZ1 = 0.1\n"
-    )
-    SA, FZ = np.array([-0.1, 0.03, 0.2]), 3000.0
-    side = evaluate_tir(parse_tir(text, where="x.tir"), SA=SA, FZ=FZ)[0]
-    assert -side.MZ / side.FY == pytest.approx(FZ * 0.3 * 0.1 * np.cos(SA) / (over * 4000), rel=1e-12)
-    plain = evaluate_tir(parse_tir(text, where="x.tir"), SA=SA, FZ=FZ, KAPPA=0.05)[0]
-    armed = evaluate_tir(parse_tir(text + "SSZ2 = 0.02\n", where="x.tir"), SA=SA, FZ=FZ, KAPPA=0.05)[0]
-    arm = 0.3 * 0.02 * armed.FY / (over * 4000)
-    assert armed.MZ - plain.MZ == pytest.approx(arm * armed.FX, rel=1e-9)

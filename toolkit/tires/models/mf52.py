@@ -3,8 +3,7 @@
 Axes ISO-W, SI. Equations: Pacejka, Tyre and Vehicle Dynamics (2002), 4.E1 to 4.E78, as the tire files of
 FITTYP 5, 6, 21 and 52 name them. Against 6.x: no pressure, camber enters by PHY3 and the scale factors
 LGAX, LGAY, LGAZ, and F_y in M_z is the one with camber. Turn slip factors are one, alpha* = tan(alpha),
-gamma* = sin(gamma) unless raw angles are asked for, the curvature factors are limited to 1. Trail and arm of
-FX stand over the nominal load F_z0 as it is, those of 6.x over the scaled one, LFZO F_z0.
+gamma* = sin(gamma) unless raw angles are asked for, the curvature factors are limited to 1.
 """
 
 from __future__ import annotations
@@ -40,8 +39,7 @@ def forces(p: Mapping[str, float], q: State, *, UNLOADED_RADIUS: float) -> Force
     reduced = weight_y(p, q) * lateral.FY
     FY = reduced + kappa_force(p, q, lateral.friction)
     MZ = _moment(p, q, lateral, FY=reduced, ratio=pure.K / lateral.K, UNLOADED_RADIUS=UNLOADED_RADIUS)
-    unscaled = dataclasses.replace(q, F0=q.F0 / s("LFZO"))
-    return Forces(FX=FX, FY=FY, MZ=MZ + arm(p, unscaled, FY=FY, UNLOADED_RADIUS=UNLOADED_RADIUS) * FX)
+    return Forces(FX=FX, FY=FY, MZ=MZ + arm(p, q, FY=FY, UNLOADED_RADIUS=UNLOADED_RADIUS) * FX)
 
 
 def side(p: Mapping[str, float], q: State) -> Lateral:
@@ -71,7 +69,7 @@ def _moment(
     B = (c("QBZ1") + c("QBZ2") * df + c("QBZ3") * df * df) * (1 + c("QBZ4") * g + c("QBZ5") * np.abs(g))
     B = B * s("LKY") / nonzero(q.mu_y)
     C = c("QCZ1")
-    D = FZ * (UNLOADED_RADIUS * s("LFZO") / q.F0) * (c("QDZ1") + c("QDZ2") * df) * s("LTR")
+    D = FZ * (UNLOADED_RADIUS / q.F0) * (c("QDZ1") + c("QDZ2") * df) * s("LTR")
     D = D * (1 + c("QDZ3") * g + c("QDZ4") * g * g)
     E = c("QEZ1") + c("QEZ2") * df + c("QEZ3") * df * df
     E = np.minimum(E * (1 + (c("QEZ4") + c("QEZ5") * g) * (2 / np.pi) * np.arctan(C * B * x)), 1.0)
