@@ -172,3 +172,11 @@ def test_a_report_that_tells_a_diagnosis_is_still_a_report(tmp_path: Path) -> No
     assert check_template(opened(tmp_path, p("{{tk:diagnosis.verdict}}")), Style()) == ()
     wrong = check_template(opened(tmp_path, p("{{tk:diagnosis.model}}")), Style())
     assert [one.rule for one in wrong] == ["unknown-tag"]
+
+
+def test_a_range_of_the_output_itself_is_one_of_the_simulated_output(tmp_path: Path) -> None:
+    """A limit is missing: the simulation goes to 22 650 kW, where the recording ends at 3 600."""
+    place = MismatchPlace(variable="F", start=8558.0, end=22650.0, unit="N", runs=("r0",))
+    answer = dataclasses.replace(ANSWER, mismatch=(dataclasses.replace(ANSWER.mismatch[0], where=(place,)),))
+    tags = {each.tag: each.text for each in made("org", Told(answer=answer), tmp_path).manifest}
+    assert "most of it where the simulated F is" in tags["tk:diagnosis.where"]

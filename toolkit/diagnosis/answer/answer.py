@@ -53,6 +53,10 @@ class MismatchPlace:
             return f"{number(self.start)} to {number(self.end)}"
         return str(self.start)
 
+    def over(self, channel: str) -> str:
+        """Return the variable in words: of a mismatch of the channel itself the range is that simulated."""
+        return f"the simulated {channel}" if self.variable == channel else self.variable
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelMismatch:

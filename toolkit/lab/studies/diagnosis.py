@@ -275,7 +275,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         for at in place.where[:1]:
             extent = "over all of" if at.whole else "mostly where"
             lines.append(
-                f"{place.channel}: mismatch {extent} {at.variable}{',' if at.whole else ' is'} "
+                f"{place.channel}: mismatch {extent} {at.over(place.channel)}{',' if at.whole else ' is'} "
                 + with_unit(at.ends("{:.4g}".format), at.unit)
             )
     rows = [

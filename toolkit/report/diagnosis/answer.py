@@ -113,7 +113,8 @@ def _where(source: Told, style: Style) -> str | None:
             continue
         for at in mismatch.where[:1]:
             ends = at.ends(lambda value: _n(value, style, 4))
-            extent = f"over all of {at.variable}," if at.whole else f"most of it where {at.variable} is"
+            over_it = at.over(mismatch.channel)
+            extent = f"over all of {over_it}," if at.whole else f"most of it where {over_it} is"
             text += f", {extent} {ends} {printed(at.unit)}".rstrip()
         sentences.append(f"{text} ({style.decimal(chance(mismatch.p_value))}).")
     return " ".join(sentences) or None

@@ -379,7 +379,8 @@ def _place_sentence(mismatch: ChannelMismatch) -> str:
         return f"{channel}: the residual is too large to be taken for noise, and no test tells it from noise."
     for place in mismatch.where[:1]:
         ends = place.ends(lambda value: few(value, 4))
-        extent = f"over all of {place.variable}," if place.whole else f"most of it where {place.variable} is"
+        over_it = place.over(channel)
+        extent = f"over all of {over_it}," if place.whole else f"most of it where {over_it} is"
         text += with_unit(f", {extent} {ends}", place.unit)
     return f"{text} ({chance(mismatch.p_value)})."
 
