@@ -58,9 +58,8 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.simulator import Largest
     from toolkit.worker.serve import Handlers
 
-    _Set = tuple[
-        tuple[Any, ...], Mapping[str, float], list[AppliedEffect]
-    ]  # keys of the runs, parameters, forces
+    # Keys of the runs, parameters, forces.
+    _Set = tuple[tuple[Any, ...], Mapping[str, float], list[AppliedEffect]]
 
 ATOL = 1e-7  # of a state's spread over a run; before that is known, a hundredth of it of one
 FINER = 4  # rows between two rows, one of them among them
@@ -461,12 +460,8 @@ class OdeModel:
             meanings = declared_dimensions(listed) | self._dimensions
             return [(self.states[i], None) for i in fitting(effect.term, at, self.derivative_of, meanings)]
         others = [(driver.name, driver.unit) for driver in self.case.drivers]
-        found = channel_places(
-            effect,
-            [(output.name, output.unit) for output in self.outputs],
-            others,
-            set(known_names(self.case)),
-        )
+        outputs = [(output.name, output.unit) for output in self.outputs]
+        found = channel_places(effect, outputs, others, set(known_names(self.case)))
         return found + input_places(effect, [pair for pair in others if pair[0] in self._inputs])
 
     def setting(self, run: Run) -> Setting:
