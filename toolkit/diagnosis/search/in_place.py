@@ -78,36 +78,56 @@ def foretold_best(
     """
     chosen = list(steps)
     for i, step in enumerate(steps if leaves_more_than_noise(problem, base) else ()):
-        others = tuple(each for each in base.active if each.key != step.active.key)
-        near = [each for each in step.rivals if each.difference > (STEP.rival - 1) * step.gain]
-        better, best = None, held_base.total + STEP.least_gain
-        for rival in sorted(near, key=lambda each: -each.difference)[: STEP.judged - 1]:
-            if rival.active.key in {each.key for each in others} or may_wander(problem, rival.active):
-                continue
-            try:
-                instead = fit(problem, (*others, rival.active), start=base.p)
-                if only_bends(problem, instead) or drifts_faster(problem, base, instead):
-                    continue
-                scores = hold_out(problem, folds, instead.active, instead)
-            except FitError:  # the simulation does not run with it
-                continue
-            if scores.total > best:
-                better, best = (rival, instead, scores), scores.total
+        better = _foretells_better(problem, folds, base, held_base, step)
         if better is not None:
-            rival, base, gained = better[0], better[1], best - held_base.total
-            held_base = better[2]
-            behind = [replace(each, difference=each.difference - rival.difference) for each in step.rivals]
-            chosen[i] = replace(
-                step,
-                active=base.active[-1],
-                held_out_gain=step.held_out_gain + gained,
-                gain=step.gain + rival.difference,
-                rivals=(
-                    Rival(active=step.active, difference=-rival.difference),
-                    *(each for each in behind if each.active.key != rival.active.key),
-                ),
-            )
+            rival, instead, scores = better
+            gained = scores.total - held_base.total
+            chosen[i] = _replaced(step, rival, instead.active[-1], gained=gained)
+            base, held_base = instead, scores
     return base, held_base, chosen
+
+
+def _foretells_better(
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, step: Step
+) -> tuple[Rival, Fit, HeldOut] | None:
+    """Return the rival that foretells unseen rows best in an effect's place, None where the effect does."""
+    others = tuple(each for each in base.active if each.key != step.active.key)
+    present = {each.key for each in others}
+    near = [
+        each
+        for each in step.rivals
+        if each.difference > (STEP.rival - 1) * step.gain
+        and each.active.key not in present
+        and not may_wander(problem, each.active)
+    ]
+    better, best = None, held_base.total + STEP.least_gain
+    for rival in sorted(near, key=lambda each: -each.difference)[: STEP.judged - 1]:
+        try:
+            instead = fit(problem, (*others, rival.active), start=base.p)
+            if only_bends(problem, instead) or drifts_faster(problem, base, instead):
+                continue
+            scores = hold_out(problem, folds, instead.active, instead)
+        except FitError:  # the simulation does not run with it
+            continue
+        if scores.total > best:
+            better, best = (rival, instead, scores), scores.total
+    return better
+
+
+def _replaced(step: Step, rival: Rival, active: AppliedEffect, *, gained: float) -> Step:
+    """Return a step with a rival in the effect's place, as fitted there; ``gained`` on unseen rows."""
+    behind = [
+        replace(each, difference=each.difference - rival.difference)
+        for each in step.rivals
+        if each.active.key != rival.active.key
+    ]
+    return replace(
+        step,
+        active=active,
+        held_out_gain=step.held_out_gain + gained,
+        gain=step.gain + rival.difference,
+        rivals=(Rival(active=step.active, difference=-rival.difference), *behind),
+    )
 
 
 def _alike(
