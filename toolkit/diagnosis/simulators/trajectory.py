@@ -281,9 +281,8 @@ def recursion(slopes: Array, added: Array) -> Array:
 
     n, sets, rows = added.shape
     right = np.ascontiguousarray(added.transpose(1, 2, 0)).reshape(sets, rows * n)
-    band = np.zeros(
-        (slopes.shape[1], rows, n, 2 * n)
-    )  # of every column, what stands on and under its diagonal
+    # Of every column what stands on and under its diagonal.
+    band = np.zeros((slopes.shape[1], rows, n, 2 * n))
     for j in range(n):
         band[:, :-1, j, n - j : 2 * n - j] = -slopes[1:, :, :, j].transpose(1, 0, 2)
     solved = np.empty_like(right)
