@@ -106,9 +106,7 @@ def test_the_answer_stands_on_its_page_number_by_number(answered: Path) -> None:
         body = shown(bench)
         page = bench.page(f"/diagnosis/{ANSWER}")
         assert f'data-verdict="{answer["verdict"]}"' in body
-        assert re.search(
-            r">nonlinearity (of|on) F, quadratic [^<]+: explains \d+ % of", html.unescape(body)
-        )
+        assert re.search(r">nonlinearity (of|on) F, quadratic [^<]+: explains \d+ % of", html.unescape(body))
         for effect in answer["effects"]:
             values = [float(value) for value in page.data(effect=effect["name"])]
             for parameter in effect["parameters"]:
