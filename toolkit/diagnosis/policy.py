@@ -430,6 +430,8 @@ class _Laws:
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
+    locked: int = _set(8, "frequencies", "to a line of the whole session, for a tone whose phase goes on")
+    locked_most: int = _set(4000, "frequencies", "runs farther apart share no phase of one tone")
     ends: int = _set(81, "times of a run", "between which an event in an equation may begin and end")
     apart: float = _set(1e-12, "of a response", "squared, of two steps in an equation: less is rounding")
     columns: int = _set(4_000_000, "numbers of a response", "of laws in an equation propagated together")
@@ -486,9 +488,7 @@ class _Location:
     whole: float = _set(0.95, "of the rows", "a range as wide is all that was recorded")
     ranges: int = _set(3, "ranges", "told of one mismatch, the narrowest first")
     listed: int = _set(8, "values left out", "named one by one: a page of them says no more")
-    run: float = _set(
-        0.2, "of the mean energy of a run", "a run with less is not named among those of a range"
-    )
+    run: float = _set(0.2, "of a run's mean energy", "a run with less is not named among those of a range")
 
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()
