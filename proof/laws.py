@@ -91,7 +91,8 @@ def _held(true: Law, law: dict[str, Any]) -> dict[str, bool]:
     said = variables | ({"t"} if form in ("event", "tone") else frozenset())
     return {
         "learned": True,
-        "place": place.get("kind") in true.kind.split() and (channels is None or place.get("channel") in channels),
+        "place": place.get("kind") in true.kind.split()
+        and (channels is None or place.get("channel") in channels),
         "variables": form in true.forms and (true.variables is None or said == true.variables),
         "memory": true.memory is None
         or true.memory == (law.get("memory_s") is not None or form in ("mode", "loop")),

@@ -54,6 +54,8 @@ def test_what_is_no_tire_has_no_friction_to_scale(tmp_path, unit):
         "python", parameters={"gain": (1.0, "1", 0.005)}, inputs={"L": unit}, outputs={"F": "N"}, runs=2
     )
     L = np.linspace(0, 10, 60)
-    runs = {f"r{k}__csv": pd.DataFrame({"t": 0.1 * np.arange(60), "L": L, "F": L + 0.01 * k}) for k in range(2)}
+    runs = {
+        f"r{k}__csv": pd.DataFrame({"t": 0.1 * np.arange(60), "L": L, "F": L + 0.01 * k}) for k in range(2)
+    }
     problem, base = _based(write_case(tmp_path, head, simulator=CELL, **runs))
     assert list(scales_of(problem, base)) == []

@@ -93,9 +93,7 @@ def _place(trial: Trial) -> LawPlace:
     """Return where a law acts: on an output, in the equation of a state, or on what drives the tire."""
     if trial.acts in SCALED:
         return LawPlace(kind="input", channel=SCALED[trial.acts])
-    return LawPlace(
-        kind="state" if trial.acts == "enters" else "output", channel=str(trial.applied.channel)
-    )
+    return LawPlace(kind="state" if trial.acts == "enters" else "output", channel=str(trial.applied.channel))
 
 
 def _interval(value: float, half: float, *, positive: bool) -> tuple[float, float] | None:
