@@ -189,7 +189,7 @@ def test_five_repeats_of_which_two_had_a_slower_actuator(tmp_path):
 
 @pytest.mark.campaign("a whole search: responses of such laws are held in every run (test_trial_scales)")
 def test_a_grip_that_has_a_bump_over_the_temperature_is_a_law_of_the_friction(tmp_path):
-    """No factor of one output is it: where the patch sticks nothing changes, and the trail goes with the slip."""
+    """No factor of one output is it: where the patch sticks nothing changes, and the trail shifts."""
     rng = np.random.default_rng(3)
     runs = []
     for seed in range(3):

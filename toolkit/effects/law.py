@@ -1,10 +1,10 @@
 """A law without a name as an effect: what a diagnosis learned of structure that no effect explains.
 
 Its name is its formula and how it acts, so that a model file, a worker and a fit mean the same by it:
-``law adds: a*tanh([SA]/s)``. It acts on an output (``adds`` to it, ``multiplies`` it), ``scales`` what drives a
-tire (its friction or its stiffness; a trail's law is one of MZ), or ``enters`` the equation of a state, where it is taken from
-the state's rate. Signals are in the units of the recording:
-an applied law carries the factor and zero by which its setting's SI values become those.
+``law adds: a*tanh([SA]/s)``. It acts on an output (``adds`` to it, ``multiplies`` it), ``scales`` what drives
+a tire (its friction or its stiffness; a trail's law is one of MZ), or ``enters`` the equation of a state,
+where it is taken from the state's rate. Signals are in the units of the recording: an applied law carries
+the factor and zero by which its setting's SI values become those.
 
 ``a*tanh([SA]/s)`` has the signal SA and the parameters a and s. A formula comes from a file as well, so it
 is read and never run: a tree of which only the arithmetic, the functions and the operators with a memory

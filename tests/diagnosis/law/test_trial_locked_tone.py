@@ -35,5 +35,5 @@ def test_a_tone_of_a_session_starts_within_a_line_of_the_session(tmp_path, frequ
     problem = problem_of(case, model_of(case, None))
     tones = [trial for trial in trials_of(problem, fit(problem, plain=True), ("F",)) if trial.form == "tone"]
     session_line = 1 / (6 * RUN_S + 5 * PAUSE_S)
-    off = [abs(trial.applied.values["frequency"] - frequency) for trial in tones]
+    off = [abs(dict(trial.applied.values)["frequency"] - frequency) for trial in tones]
     assert min(off) < session_line / 4

@@ -35,7 +35,8 @@ def test_a_tire_answers_to_a_law_of_its_friction_as_it_was_foretold(tmp_path):
     straight = next(trial for trial in trials if trial.shape.text == "a*{x}")
     (response,) = all_responses(problem, base, [straight])
     small = 1e-9  # 1/N: of 5000 N a change of the friction by 5e-6
-    law = dataclasses.replace(straight.applied, values={**straight.applied.values, "a": small})
+    sizes = dict(straight.applied.values) | {"a": small}
+    law = dataclasses.replace(straight.applied, values=sizes)
     moved = problem.simulate(base.p, (*base.active, law))
     for name in ("FY", "MZ"):
         change = (moved[name] - base.simulated[name]) / small

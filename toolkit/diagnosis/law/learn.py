@@ -266,7 +266,7 @@ def _judged(
 def _of_runs(
     problem: Problem, name: str, before: HeldOut, after: HeldOut, trial: Trial
 ) -> list[tuple[Array, Array, Array]]:
-    """Return of every run what its own sizes are in proportion to, and an output's errors before and after."""
+    """Return of every run what sizes of its own are in proportion to, and an output's errors."""
     sizes = [before.simulated[name], *([trial.swayed[name]] if trial.swayed else ())]
     errors = [problem.observed[name] - each.simulated[name] for each in (before, after)]
     counting = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]

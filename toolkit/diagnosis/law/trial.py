@@ -89,9 +89,9 @@ class Signal:
 class Trial:
     """One law at one place from one start, with its linearised gain of twice the log-likelihood.
 
-    ``unit`` is that of what it adds, or of its factor. ``swayed`` is, of a law that scales what drives a tire,
-    how every output answers to its factor, (rows,). ``looked`` counts the laws that were looked at to find
-    it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
+    ``unit`` is that of what it adds, or of its factor. ``swayed`` is, of a law that scales what drives a
+    tire, how every output answers to its factor, (rows,). ``looked`` counts the laws that were looked at to
+    find it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
     """
 
     shape: Shape
@@ -376,7 +376,7 @@ def scales_of(problem: Problem, base: Fit) -> Iterator[Trial]:
     signals = [
         signal
         for signal in signals_of(problem, base, problem.names[0])
-        if (signal.steady and ITSELF not in signal.written or signal.name == TIME)
+        if ((signal.steady and ITSELF not in signal.written) or signal.name == TIME)
         and signal.name not in ("SA", "SA_CMD")
     ]
     for acts in SCALED if signals else ():
