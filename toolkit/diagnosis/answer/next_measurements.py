@@ -189,8 +189,8 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     if "run" in variables:
         levels = " and ".join(_levels(search.problem))
         sentences.append(
-            f"{subject} differs from run to run, as {levels} does: change {levels} within a run, or have runs "
-            "at more of its values, each twice."
+            f"{subject} differs from run to run, as {levels} does: change {levels} within a run, or have "
+            "runs at more of its values, each twice."
             if levels
             else f"{subject} differs from run to run: repeat one run unchanged, and note what else changed."
         )
