@@ -187,10 +187,13 @@ def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
             elif entries[key][1]:
                 yield f"{path}: missing"
     elif origin in (Union, types.UnionType):
-        tried = [list(departures(value, form, place)) for form in inner]
+        tried: list[list[str]] = []
+        for form in inner:
+            tried.append(list(departures(value, form, place)))
+            if not tried[-1]:
+                return
         # What comes nearest is what was meant: the form with the fewest departures below the place itself.
-        if all(tried):
-            yield from min(tried, key=lambda faults: (f"{place}: " in faults[0], len(faults)))
+        yield from min(tried, key=lambda faults: (f"{place}: " in faults[0], len(faults)))
     elif origin is Literal:
         if value not in inner:
             yield f"{place}: {value!r} is none of {', '.join(map(str, inner))}"
@@ -238,6 +241,7 @@ def _but_null(annotation: Any) -> Any:
     return Annotated[(functools.reduce(operator.or_, forms), *marks)]
 
 
+@functools.cache
 def _bare(annotation: Any) -> tuple[Any, str]:
     """Return an annotation without its marks, and the text beside it."""
     meaning = ""
