@@ -70,11 +70,11 @@ class FmuFunction:
         if self._description.coSimulation is None:
             raise self._unusable("a unit of model exchange alone", "co-simulation, which has its own solver")
         self._inputs = [
-            (channel, self._variable(name, self._unit_of(channel), ("input",)))
+            (channel, self._variable(name, case.unit(channel), ("input",)))
             for name, channel in self._pairs(case.simulation.fmu_inputs, ("input",))
         ]
         self._outputs = [
-            (channel, self._variable(name, self._unit_of(channel), ("output", "local")))
+            (channel, self._variable(name, case.unit(channel), ("output", "local")))
             for channel, name in (
                 (output.name, dict(case.simulation.fmu_outputs).get(output.name, output.name))
                 for output in case.outputs
@@ -180,9 +180,6 @@ class FmuFunction:
             if variable.causality in causality and variable.name in channels:
                 pairs.setdefault(variable.name, variable.name)
         return list(pairs.items())
-
-    def _unit_of(self, channel: str) -> str:
-        return self.case.unit(channel)
 
     def _variable(self, name: str, case_unit: str, causality: tuple[str, ...]) -> _Variable:
         variables = {variable.name: variable for variable in self._description.modelVariables}
