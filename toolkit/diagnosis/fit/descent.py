@@ -103,7 +103,7 @@ class Weighing:
         space: Space,
         layouts: dict[str, Layout],
         noise: dict[str, Autoregression],
-        drifting: Mapping[str, Differences],
+        drifting: Mapping[str, Differences] = MappingProxyType({}),
     ) -> None:
         self._space, self._noise, self._drifting = space, noise, drifting
         self._layouts = {
