@@ -145,6 +145,17 @@ def test_where_positions_are_the_sum_of_what_came_before_the_squares_of_rates_ar
     assert squares(by_rates, drifting) < squares(by_positions, drifting)
 
 
+def test_a_rate_stands_in_the_row_at_which_it_ends(tmp_path):
+    case = written(tmp_path, runs(2, zero=0.3))
+    problem = problem_of(case, model_of(case, None))
+    apart = replace(problem, rates={"position": 4})
+    rows = np.arange(problem.rows, dtype=float)
+    at = apart.judged_at("position")
+    assert at.tolist() == [*range(4, T.size), *range(T.size + 4, 2 * T.size)]
+    assert len(apart.judged("position", rows)) == len(at)
+    assert problem.judged_at("position").tolist() == list(range(2 * T.size))
+
+
 def test_least_squares_of_rates_tell_the_parameters_within_their_interval(tmp_path):
     """A cart whose steady forces nobody simulates: coloured noise may take them, and its mass is 5 kg."""
     case = written(tmp_path, runs(3, seed=4, zero=0.3))

@@ -246,10 +246,13 @@ def test_a_residual_is_mapped_over_every_kind_of_variable():
         drivers=[SimpleNamespace(name=name, unit=unit) for name, unit in units.items()],
         channels=[SimpleNamespace(role="time", unit="s")], has_time=True,
     )  # fmt: skip
-    rows = {"FY": np.ones(2 * n, bool)}
     fit = SimpleNamespace(residual={"FY": np.random.default_rng(2).normal(0, 2.0, 2 * n)})
     found = SimpleNamespace(
-        problem=SimpleNamespace(case=case, runs=runs, kept=rows), refitted=fit, augmented=fit
+        problem=SimpleNamespace(
+            case=case, runs=runs, judged=lambda _, values: values, judged_at=lambda _: np.arange(2 * n)
+        ),
+        refitted=fit,
+        augmented=fit,
     )
     mapped = {label: (values, levels) for label, values, levels in variables(found)}
     # An inclination that never varies tells nothing, nor does a mounting that is one and the same.

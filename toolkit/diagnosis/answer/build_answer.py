@@ -178,8 +178,10 @@ def _unit_hints(search: Search, laws: Laws) -> tuple[str, ...]:
     """Return sentences where a law's factor is that of a channel in another unit, within its interval."""
     problem, hints = search.problem, list[str]()
     for law in found_laws(search, laws):
-        scaled = law.acts == "multiplies" or tuple(law.variables) == (law.place.channel,)
-        for parameter in law.parameters if scaled and law.place.kind == "output" else ():
+        # What is the same at every value of its variables is a factor; a wave or a bend has none.
+        factors = ("a1 + a2*", f"a*{law.place.channel}")
+        scaled = law.place.kind == "output" and str(law.formula).startswith(factors)
+        for parameter in law.parameters[:1] if scaled else ():
             if parameter.unit != "1" or isinstance(parameter.value, str) or parameter.ci95 is None:
                 continue
             low, high = sorted(1 + end for end in parameter.ci95)

@@ -89,6 +89,11 @@ class Problem:
             rates.append((there[apart:] - there[:-apart]) / (t[apart:] - t[:-apart]))
         return np.concatenate(rates)
 
+    def judged_at(self, name: str) -> NDArray[np.intp]:
+        """Return the rows at which stands what counts of an output; a rate stands at its end."""
+        kept = [rows.start + np.flatnonzero(self.kept[name][rows]) for rows in self.slices]
+        return np.concatenate([each[self.rates.get(name, 0) :] for each in kept])
+
     def judged_sd(self, name: str, sd: float) -> float:
         """Return the standard deviation of what is judged of an output by that of its values' white noise."""
         return float(np.sqrt(2) * sd / self.rate_s(name)) if name in self.rates else sd

@@ -252,7 +252,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         )
     for law in diagnosis.laws:
         lines += ["", f"law without a name: {law.sentence}"]
-        for parameter in law.parameters:
+        for parameter in law.parameters if law.formula is not None else ():
             if isinstance(parameter.value, str) or not math.isfinite(parameter.value):
                 continue
             value, interval = rounded(parameter.value, parameter.ci95)

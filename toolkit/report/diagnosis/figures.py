@@ -206,9 +206,9 @@ def run_map(search: Search, diagnosis: Diagnosis, *, after: bool) -> bytes:
         share = np.zeros((len(names), len(problem.runs)))
         for i, name in enumerate(names):
             noise = max(floors[name], 1e-300)
+            at, judged = problem.judged_at(name), problem.judged(name, fit.residual[name])
             for j, run in enumerate(problem.slices):
-                counting = problem.kept[name][run]
-                values = fit.residual[name][run][counting]
+                values = judged[(at >= run.start) & (at < run.stop)]
                 share[i, j] = np.sqrt(np.mean(values**2)) / noise if len(values) else np.nan
         return share
 
@@ -325,8 +325,8 @@ def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool
         next((score.noise_floor for score in diagnosis.fit.held_out if score.channel == channel), 0.0), 1e-300
     )
     shown_variables = variables(search)[:_PANELS]
-    mask = search.problem.kept[channel]
-    if not shown_variables or not mask.any():
+    at = search.problem.judged_at(channel)
+    if not shown_variables or not len(at):
         return None
     fits = [("refitted", ORANGE, search.refitted)]
     if after:
@@ -342,9 +342,10 @@ def size_maps(search: Search, diagnosis: Diagnosis, channel: str, *, after: bool
                 continue
             label, values, levels = shown_variables[i]
             for j, (name, colour, fit) in enumerate(fits):
+                judged = search.problem.judged(channel, fit.residual[channel])
                 _panel(
-                    axes, values[mask], fit.residual[channel][mask] / noise, levels,
-                    label=name, colour=colour, at=(j - (len(fits) - 1) / 2, 0.8 / len(fits)),
+                    axes, values[at], judged / noise, levels,
+                    label=name, colour=colour, beside=(j - (len(fits) - 1) / 2, 0.8 / len(fits)),
                 )  # fmt: skip
             axes.axhline(1.0, color=GREEN, linewidth=1.2, label="noise")
             axes.set_xlabel(label)
@@ -367,7 +368,7 @@ def _panel(
     *,
     label: str,
     colour: str,
-    at: tuple[float, float],
+    beside: tuple[float, float],
 ) -> None:
     if not levels:
         centre, mean = binned(x, residual**2, bins=_MAP_BINS)
@@ -375,7 +376,8 @@ def _panel(
         return
     sizes = [residual[x == i] for i in range(len(levels))]
     heights = [float(np.sqrt(np.mean(size**2))) if len(size) else 0.0 for size in sizes]
-    axes.bar(np.arange(len(levels)) + at[0] * at[1], heights, width=at[1], color=colour, label=label)
+    place = np.arange(len(levels)) + beside[0] * beside[1]
+    axes.bar(place, heights, width=beside[1], color=colour, label=label)
     axes.set_xticks(range(len(levels)), levels)
     axes.grid(visible=False, axis="x")
 

@@ -278,10 +278,10 @@ def _interval(effect: DiagnosedEffect, parameter: EffectEstimate) -> str:
 
 
 def _law(law: DiagnosedLaw) -> _Law:
-    rows = [
+    rows = [  # the heights of a curve are its figure, and a phase that differs from run to run has no number
         (parameter.name, value, parameter.unit, interval)
         for parameter in law.parameters
-        if not isinstance(parameter.value, str)
+        if law.formula is not None and not isinstance(parameter.value, str) and math.isfinite(parameter.value)
         for value, interval in (rounded(parameter.value, parameter.ci95),)
     ]
     svg = figures.law_curve(law)
