@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import os
+import re
+import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,6 +48,7 @@ class PlanNextAnswer(NextRunPlan):
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
+_PLAIN, _APART = re.compile(r"[A-Za-z0-9_]{1,40}"), "_apart"
 
 
 def plan_next(
@@ -300,17 +304,20 @@ def plots(problem: Problem, members: Sequence[Member], chosen: NextRun) -> tuple
         )
 
     figures = []
-    for output in problem.model.outputs:
+    for place, output in enumerate(problem.model.outputs, start=1):
+        # A file has the output's name where that is one on every disk and in every address.
+        plain = _PLAIN.fullmatch(output.name) is not None and not output.name.endswith(_APART)
+        picture = f"next_{output.name if plain else f'output-{place}'}"
         columns = [predicted.outputs[output.name] for predicted in chosen.predicted]
         noise = members[0].fit.noise[output.name].marginal_sd
         figures += [
             plot(
-                output, f"next_{output.name}", output.name,
+                output, picture, output.name,
                 f"{output.name} in the run that is proposed, as each member of the class predicts it.",
                 columns,
             ),
             plot(
-                output, f"next_{output.name}_apart", f"{output.name} less that of {first}",
+                output, picture + _APART, f"{output.name} less that of {first}",
                 f"How far the predictions are from that of {first}; noise of {output.name} has a standard "
                 f"deviation of {noise:.3g} {output.unit.replace('*', '·')}.",
                 [column - columns[0] for column in columns],
@@ -348,9 +355,9 @@ def plan_text(plan: NextRunPlan, files: Sequence[str], *, model: Path, out: Path
     if files:
         folder = out or Path()
         lines += ["", *(f"written: {folder / name}" for name in files)]
-        pairs = [f"--condition {key}={value}" for key, value in _simulated(plan.conditions).items()]
-        rehearsal = ["toolkit simulate", str(model), f"--inputs {folder / INPUTS}", *pairs, "--out DIR"]
-        lines.append(f"  {' '.join(rehearsal)}")
+        stated = [("--condition", f"{key}={value}") for key, value in _simulated(plan.conditions).items()]
+        pairs = itertools.chain.from_iterable([("--inputs", str(folder / INPUTS)), *stated])
+        lines.append(f"  {shlex.join(['toolkit', 'simulate', str(model), *pairs, '--out', 'DIR'])}")
     return "\n".join(lines)
 
 
