@@ -129,8 +129,7 @@ def test_the_search_ends_where_all_sweeps_looked_at_would(text: str, monkeypatch
                 steering=steering, speeds_m_s=(speeds[0], speeds[-1]), cycles=cycles, loads_N=loads
             )
             reaches = [
-                sweep_search._reach(case, fit, design, demand)
-                for case, fit in zip(cases, basis, strict=True)
+                sweep_search._reach(case, fit, design, demand) for case, fit in zip(cases, basis, strict=True)
             ]
             worst = max(reach.ratio for reach in reaches)
             seconds = design.seconds(between_files_s=30.0, to_load_s=2.5)

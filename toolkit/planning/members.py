@@ -270,9 +270,7 @@ def _simulated(
     return simulated
 
 
-def _moved(
-    problem: Problem, fitted: Fit, step: Array
-) -> tuple[dict[str, float], tuple[AppliedEffect, ...]]:
+def _moved(problem: Problem, fitted: Fit, step: Array) -> tuple[dict[str, float], tuple[AppliedEffect, ...]]:
     """Return the parameters and effects of a fit, its values moved by a step (n,)."""
     steps = iter(step.tolist())
     values = dict(problem.known)
@@ -283,7 +281,10 @@ def _moved(
     active = tuple(
         dataclasses.replace(
             applied,
-            values={**applied.values, **{p.name: applied.values[p.name] + next(steps) for p in applied.searched}},
+            values={
+                **applied.values,
+                **{p.name: applied.values[p.name] + next(steps) for p in applied.searched},
+            },
         )
         for applied in fitted.active
     )

@@ -191,13 +191,18 @@ class _Steered:
             *fewer, most = itertools.product(_CYCLES, repeat=len(speeds))
             # The most cycles first. Noise falls with them: where they do not serve, no fewer do.
             for cycles in (most, *fewer):
-                design = SweepDesign(
-                    steering=self.steering, speeds_m_s=speeds, cycles=cycles, loads_N=loads
-                )
+                design = SweepDesign(steering=self.steering, speeds_m_s=speeds, cycles=cycles, loads_N=loads)
                 seconds = self.seconds(design)
-                if best is not None and best[1].feasible and seconds >= best[1].seconds and cycles is not most:
+                if (
+                    best is not None
+                    and best[1].feasible
+                    and seconds >= best[1].seconds
+                    and cycles is not most
+                ):
                     continue
-                reaches = tuple(_reach(self.cases[at], self._foretold(at), design, self.demand) for at in cases)
+                reaches = tuple(
+                    _reach(self.cases[at], self._foretold(at), design, self.demand) for at in cases
+                )
                 judged = SweepChoice(design=design, reaches=reaches, seconds=seconds)
                 key = (max(judged.worst, 1.0), seconds, self.place)
                 if best is None or key < best[0]:

@@ -41,7 +41,9 @@ def test_before_every_record_is_an_error_that_lists_the_candidates(two: Registry
     assert "hub-r1 (in force from 2026-02-01)" in str(caught.value)
 
 
-def test_an_instrument_without_records_is_refused_with_those_that_have_some(two: Registry, tmp_path: Path) -> None:
+def test_an_instrument_without_records_is_refused_with_those_that_have_some(
+    two: Registry, tmp_path: Path
+) -> None:
     with pytest.raises(RegistryError) as misspelt:
         two.in_force("hubb", on=date(2026, 3, 1))
     assert misspelt.value.rule == "no-record-in-force"

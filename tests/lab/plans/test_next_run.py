@@ -1,4 +1,4 @@
-"""The files of a run are named so that every disk and every address takes them, whatever outputs are called."""
+"""Files of a run have names that every disk and address takes, whatever its outputs are called."""
 
 from __future__ import annotations
 

@@ -294,7 +294,9 @@ class Registry:
                 f"no calibration of {instrument} is in force on {on.isoformat()}",
                 where=self.folder / instrument,
                 got="; ".join(standings) or f"no record of {instrument}",
-                expected=("" if standings or not others else f"an instrument with records: {', '.join(others)}; ")
+                expected=(
+                    "" if standings or not others else f"an instrument with records: {', '.join(others)}; "
+                )
                 + f"an approved record in force on {on.isoformat()}, as known on {known_on.isoformat()}",
                 next_step=("" if standings or meant is None else f"did you mean {meant!r}? Else ")
                 + "approve one with 'toolkit calibration approve ID --in-force-from DATE'"

@@ -72,7 +72,7 @@ def plan_next(
     source : folder of ``toolkit diagnose --out``, or its diagnosis.json
     case : the case file; by default the one that the answer's model names
     limits, rates : ``NAME=LOW..HIGH`` in the channel's unit, ``NAME=MOST`` in that a second
-    budget_s : seconds of the search over runs
+    budget_s : seconds until the search over runs ends, a third of which it has in any case
     worker : limits of the case's own code; None runs it in this process
     template : of the sheet that stands in ``out`` beside the other files; None for none
 
@@ -95,6 +95,7 @@ def plan_next(
     from toolkit.planning.next_run import RunSearch
     from toolkit.planning.run_changes import Change, RunLimits, movable
 
+    begun = time.monotonic()
     stated = None if case is None else read_case(case)
     diagnosis, file = read_answer(source)
     effect = class_of(diagnosis, file)
@@ -113,7 +114,7 @@ def plan_next(
         tell("the members of the class")
         members = members_of(problem, diagnosis, effect)
         tell("runs")
-        ends = time.monotonic() + budget_s
+        ends = search_ends(begun, time.monotonic(), budget_s)
         search = RunSearch(
             problem=problem, members=members, limits=reach, until=lambda: time.monotonic() < ends,
             learn=(lambda _runs: None) if code is None else code.learn,
@@ -142,6 +143,15 @@ def plan_next(
         answer = dataclasses.replace(answer, document=written, files=tuple(files))
     text = plan_text(plan, answer.files, model=file.parent / "model.toml", out=out)
     return answer, text + document_text(answer.document)
+
+
+def search_ends(begun: float, now: float, budget_s: float) -> float:
+    """Return when a search ends that others had to be waited for: a third of its budget it has in any case.
+
+    >>> search_ends(0.0, 20.0, 45.0), search_ends(0.0, 40.0, 45.0)
+    (45.0, 55.0)
+    """
+    return max(begun + budget_s, now + budget_s / 3)
 
 
 def _case_of(file: Path) -> Path:
