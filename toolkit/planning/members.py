@@ -21,7 +21,6 @@ from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.noise import Autoregression, layout, whiten
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.search.candidates import CandidateEffect, candidates
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError, FitError
@@ -30,8 +29,6 @@ _STARTS = 3  # of each place, from the first to the last
 _STEP = 1e-4
 _BETWEEN = 3.0  # sd of what rows leave open, in what a row between each two changes: the next ones add to it
 _WIDEST = 3.0  # sd of a parameter that the recordings leave open, in its own size
-_FROM_DECLARED = True
-_SEEN = 2 * VERDICT.close  # square of a change, in the noise's sd, of which a diagnosis takes notice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,13 +45,14 @@ class Predicted:
 
     ``spread`` by name (n, parameters): the change by one standard deviation of each independent parameter;
     ``between`` by name (n, k): by what inputs may do between rows, whichever member is true; first where they
-    go straight. ``linear`` says whether derivatives say what one standard deviation of a parameter changes.
+    go straight. ``lost`` is the log-likelihood that a fit may miss where derivatives do not say what
+    parameters change.
     """
 
     outputs: dict[str, Array]
     spread: dict[str, Array]
     between: dict[str, Array]
-    linear: bool = True
+    lost: float = 0.0
 
 
 def class_of(diagnosis: Diagnosis, where: object) -> DiagnosedEffect:
@@ -178,7 +176,7 @@ def predict(problem: Problem, member: Member, run: Run) -> Predicted | None:
 def completed(
     problem: Problem, member: Member, run: Run, predicted: Predicted, dense: Sequence[Run]
 ) -> Predicted | None:
-    """Return what a member says of a run (`predict`) with what rows leave open, and whether it is linear.
+    """Return what a member says of a run (`predict`) with what rows leave open and what a fit may miss.
 
     None where a simulation gives no number.
 
@@ -203,28 +201,30 @@ def completed(
     away = [step * (1.0 if step @ np.sign(values) >= 0 else -1.0) for step in root.T]
     begin = np.zeros(len(values))
     begin[: len(fitted.p)] = [parameter.value for parameter in problem.free] - np.asarray(fitted.p)
-    steps = [*away, begin] if _FROM_DECLARED else away
+    steps = [*away, begin]
     moved = _simulated(problem, run, fitted, steps)
-    linear = all(
-        outputs is not None and _led(run, fitted.noise, predicted, outputs, np.linalg.pinv(root) @ step)
+    ways = [
+        _lost(run, fitted.noise, predicted, outputs, np.linalg.pinv(root) @ step)
         for step, outputs in zip(steps, moved, strict=True)
-    )
-    return dataclasses.replace(predicted, between=between, linear=linear)
+        if outputs is not None  # beyond what the simulation runs with no fit goes
+    ]
+    lost = max(ways, default=0.0)
+    return dataclasses.replace(predicted, between=between, lost=lost)
 
 
-def _led(
+def _lost(
     run: Run, noise: dict[str, Autoregression], predicted: Predicted, moved: dict[str, Array], by: Array
-) -> bool:
-    """Tell whether half of what parameters change is as derivatives say; ``by`` (n,) in standard deviations.
+) -> float:
+    """Return what a fit misses that goes by derivatives, where half of a change is not as they say.
 
-    Else a fit that goes by them ends anywhere: a pendulum that goes over the top, waves that are late by more
-    than half of one.
+    Such a fit may end anywhere: of a pendulum that goes over the top, of waves that are late by more than
+    half of one. ``by`` (n,) is what parameters are moved by, in standard deviations.
     """
     change = _white(run, {name: moved[name] - column for name, column in predicted.outputs.items()}, noise)
     slope = _white(run, {name: columns @ by for name, columns in predicted.spread.items()}, noise)
     size = float(change @ change)
     along = float(change @ slope) ** 2 / max(float(slope @ slope), 1e-300)
-    return size <= _SEEN or along >= size / 2
+    return 0.0 if along >= size / 2 else 0.5 * (size - along)
 
 
 def _tamed(fitted: Fit) -> tuple[Array, Array]:
@@ -297,15 +297,15 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
     The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
     identity). Each fit has taken what it does not explain for noise: the noise counts under which the two
     are less apart. What rows leave open by either is open to both. But a fit of the run takes simulations at
-    their rows for the truth: by what inputs that go straight between rows make of it, it is misled. Where
-    either is not linear, fits end anywhere, and nothing is to be expected.
+    their rows for the truth: by what inputs that go straight between rows make of it, it is misled. And what
+    the true member's own fit may miss is not to be expected.
 
     Parameters
     ----------
     members : those of the two predictions
     """
     expected = min(_divergence(run, member.fit.noise, true, rival) for member in members)
-    return expected if true.linear and rival.linear else min(expected, 0.0)
+    return max(expected - true.lost, min(expected, 0.0))
 
 
 def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, rival: Predicted) -> float:
