@@ -162,7 +162,9 @@ def random_change(search: RunSearch, rng: np.random.Generator) -> Change:
 
 def fitted_again(more: Problem, members: tuple[Member, ...]) -> tuple[Member, ...]:
     """Return members fitted to all recordings, each from where it was, the likeliest first."""
-    again = [Member(label=member.label, fit=fit(more, member.fit.active)) for member in members]
+    again = [
+        Member(label=member.label, fit=fit(more, member.fit.active, start=member.fit.p)) for member in members
+    ]
     return tuple(sorted(again, key=lambda member: -member.fit.log_posterior))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +13,15 @@ import pytest
 from tests.planning.class_factory import DELAY, answer, found, problem, write_case
 from toolkit.diagnosis.fit.noise import Autoregression
 from toolkit.errors import ConfigError
-from toolkit.planning.members import Predicted, class_of, denser, expected_log_evidence, members_of
+from toolkit.planning.members import (
+    Predicted,
+    class_of,
+    completed,
+    denser,
+    expected_log_evidence,
+    members_of,
+    predict,
+)
 
 
 def gaussian(mean: np.ndarray, spread: np.ndarray) -> Predicted:
@@ -103,6 +112,41 @@ def test_a_run_of_which_the_rows_mislead_a_fit_parts_nothing() -> None:
     )
     expected = expected_log_evidence(run, (member(1.0), member(1.0)), true, rival)
     assert expected == pytest.approx(0.5 * (2**2 - 3**2) * square)
+
+
+def test_a_run_in_which_derivatives_say_nothing_of_a_members_parameters_parts_nothing(tmp_path: Path) -> None:
+    """A delay that is known to 0.1 s: of a slow sine that is a shift, of a fast one it may be whole waves."""
+    posed = problem(write_case(tmp_path))
+    effect = found("channel_delay", "filter_lag")
+    members = members_of(posed, answer(posed.case.sha256, effect), effect)
+    late = next(m for m in members if m.label.startswith("channel_delay"))
+    open_delay = np.diag([0.1**2, 0.1**2])
+    wide = dataclasses.replace(late, fit=dataclasses.replace(late.fit, covariance=open_delay))
+    recorded = posed.runs[0]
+    said = {}
+    for hertz in (0.2, 4.0):
+        u = np.sin(2 * np.pi * hertz * recorded.t) * np.minimum(recorded.t, 1.0)
+        run = dataclasses.replace(recorded, columns={**recorded.columns, "u": u})
+        predicted = predict(posed, wide, run)
+        assert predicted is not None
+        whole = completed(posed, wide, run, predicted, ())
+        assert whole is not None
+        said[hertz] = run, whole
+    assert said[0.2][1].lost == 0
+    run, whole = said[4.0]
+    # Of two waves that are out of step half the sum of squares of their difference is lost.
+    waves = 0.5 * run.rows * (102 / late.fit.noise["F"].marginal_sd) ** 2
+    assert 0.1 * waves < whole.lost < 2 * waves
+    apart = gaussian(whole.outputs["F"] + 50.0, np.zeros((run.rows, 0)))
+    followed = dataclasses.replace(whole, lost=0.0)
+    for true, rival in ((whole, apart), (apart, whole)):
+        held = expected_log_evidence(
+            run, (late, late), *(followed if p is whole else p for p in (true, rival))
+        )
+        # What the true member's own fit may miss is not expected; of the rival's it is nobody's loss.
+        expected = expected_log_evidence(run, (late, late), true, rival)
+        assert expected == pytest.approx(max(held - true.lost, 0.0))
+    assert held > 3
 
 
 def test_a_denser_run_has_its_rows_and_one_between_each_two(tmp_path: Path) -> None:

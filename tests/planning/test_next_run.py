@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -68,6 +69,29 @@ def test_nothing_is_searched_beyond_certainty(search: RunSearch) -> None:
     factors = again.factors(best)
     assert len(again.judged) < sum(map(len, factors))
     assert again._alternatives(best, 0).losses.tolist() == [-again.judged[best]]
+
+
+def test_what_rows_leave_open_is_asked_of_a_run_that_may_be_better_alone(
+    search: RunSearch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The others are no better with it either: the answer is that of asking for every run."""
+    asked = []
+    completed = next_run.completed
+
+    def counted(*given: Any) -> Any:
+        asked.append(given[2])
+        return completed(*given)
+
+    monkeypatch.setattr(next_run, "completed", counted)
+    lazy = RunSearch(problem=search.problem, members=search.members, limits=RunLimits())
+    best = lazy.best()
+    known = dict(lazy.judged)
+    assert len({*asked}) < len(known) / 2
+    monkeypatch.setattr(next_run, "is_less", lambda *_: True)
+    every = RunSearch(problem=search.problem, members=search.members, limits=RunLimits())
+    assert every.best() == best
+    assert every.judged[best] == known[best]
+    assert all(every.judged[change] <= bound + 1e-9 for change, bound in known.items())
 
 
 def test_of_runs_that_part_with_certainty_the_nearest_to_the_recording_counts(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -107,6 +108,44 @@ def test_a_smaller_demand_takes_longer_and_one_that_is_too_small_is_told_with_th
     none = least("relaxation_length=0.1 mm")
     assert not none.feasible
     assert none.worst > 1
+
+
+@pytest.mark.parametrize("text", ["relaxation_length=0.1 mm", "relaxation_length=40 mm"])
+def test_the_search_ends_where_all_sweeps_looked_at_would(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A steering that one tire at one load rules out is foretold for no other; the answer is that of all."""
+    demand, loads = parse_demand(text), LOADS[1:4]
+    assert VIRTUAL.sweeping is not None
+    cases = [
+        sweep_search._Case(earlier=earlier(), load_N=load, length_m=length)
+        for load in loads
+        for length in PRIOR_M
+    ]
+    every = []
+    for place, steering in enumerate(sweep_search._steerings()):
+        basis = [sweep_search._predicted(case, steering, VIRTUAL.sweeping) for case in cases]
+        speeds = tuple(sweep_search._speeds(steering, VIRTUAL.sweeping))
+        for cycles in itertools.product(sweep_search._CYCLES, repeat=2):
+            design = sweep_search.SweepDesign(
+                steering=steering, speeds_m_s=(speeds[0], speeds[-1]), cycles=cycles, loads_N=loads
+            )
+            reaches = [
+                sweep_search._reach(case, fit, design, demand) for case, fit in zip(cases, basis, strict=True)
+            ]
+            worst = max(reach.ratio for reach in reaches)
+            seconds = design.seconds(between_files_s=30.0, to_load_s=2.5)
+            every.append((max(worst, 1.0), seconds, place, design))
+    foretold = []
+    predicted = sweep_search._predicted
+
+    def counted(case: Any, steering: Any, sweeping: Any) -> Any:
+        foretold.append((case, steering))
+        return predicted(case, steering, sweeping)
+
+    monkeypatch.setattr(sweep_search, "_predicted", counted)
+    best = min(every, key=lambda entry: entry[:3])
+    choice = least(text, loads=loads)
+    assert (choice.design, choice.seconds) == (best[3], best[1])
+    assert len(foretold) <= 0.6 * 8 * len(cases)
 
 
 def test_both_ends_of_the_prior_are_served_and_a_measured_length_takes_its_place() -> None:

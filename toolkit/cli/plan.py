@@ -242,7 +242,9 @@ def following(
         "How fast an input may change, in its unit a second; repeatable; default: four times as recorded.",
         Mark(metavar="NAME=MOST"),
     ] = None,
-    budget: Annotated[float, "Seconds of the search.", Mark(min=1.0)] = 45.0,
+    budget: Annotated[
+        float, "Seconds until the search ends; a third of them it has in any case.", Mark(min=1.0)
+    ] = 45.0,
     out: Annotated[
         Path | None, "Folder for the inputs, what each member predicts, and the steps.", INTO_FOLDER
     ] = None,

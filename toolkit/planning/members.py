@@ -45,12 +45,14 @@ class Predicted:
 
     ``spread`` by name (n, parameters): the change by one standard deviation of each independent parameter;
     ``between`` by name (n, k): by what inputs may do between rows, whichever member is true; first where they
-    go straight.
+    go straight. ``lost`` is the log-likelihood that a fit may miss where derivatives do not say what
+    parameters change.
     """
 
     outputs: dict[str, Array]
     spread: dict[str, Array]
     between: dict[str, Array]
+    lost: float = 0.0
 
 
 def class_of(diagnosis: Diagnosis, where: object) -> DiagnosedEffect:
@@ -140,8 +142,43 @@ def denser(run: Run, drivers: Sequence[str]) -> tuple[Run, Run]:
     )
 
 
-def predict(problem: Problem, member: Member, run: Run, dense: Sequence[Run] = ()) -> Predicted | None:
-    """Return what a member says of a run; None where its simulation gives no number.
+def predict(problem: Problem, member: Member, run: Run) -> Predicted | None:
+    """Return what a member says of a run, all that it leaves open between rows aside (`completed`).
+
+    None where its simulation gives no number.
+    """
+    fitted = member.fit
+    values, covariance = _tamed(fitted)
+    steps = np.sqrt(np.diag(covariance))
+    steps = np.minimum(steps, _STEP * np.maximum(np.abs(values), steps))
+    steps[steps == 0] = _STEP
+    centre, *moved = _simulated(problem, run, fitted, [0 * steps, *np.diag(steps)])
+    if centre is None:
+        return None
+    slopes = {
+        name: np.stack(
+            [
+                np.zeros(run.rows) if outputs is None else (outputs[name] - column) / step
+                for outputs, step in zip(moved, steps.tolist(), strict=True)
+            ],
+            axis=1,
+        )
+        if moved
+        else np.zeros((run.rows, 0))
+        for name, column in centre.items()
+    }
+    root = _root(covariance)
+    spread = {name: columns @ root for name, columns in slopes.items()}
+    none = {name: np.zeros((run.rows, 0)) for name in centre}
+    return Predicted(outputs=centre, spread=spread, between=none)
+
+
+def completed(
+    problem: Problem, member: Member, run: Run, predicted: Predicted, dense: Sequence[Run]
+) -> Predicted | None:
+    """Return what a member says of a run (`predict`) with what rows leave open and what a fit may miss.
+
+    None where a simulation gives no number.
 
     Parameters
     ----------
@@ -149,64 +186,109 @@ def predict(problem: Problem, member: Member, run: Run, dense: Sequence[Run] = (
         are shorter than a row, predictions differ by what inputs do between rows, which no recording shows.
     """
     fitted = member.fit
-    centre = _simulated(problem, run, fitted.p, fitted.active)
-    if centre is None:
-        return None
-    places = [(None, parameter.name) for parameter in problem.free] + [
-        (i, parameter.name) for i, applied in enumerate(fitted.active) for parameter in applied.searched
-    ]
-    covariance = _tamed(fitted, places)
-    slopes = {name: np.zeros((run.rows, len(places))) for name in centre}
-    for at, (i, name) in enumerate(places):
-        size = float(np.sqrt(covariance[at, at]))
-        value = fitted.p[at] if i is None else fitted.active[i].values[name]
-        step = min(size, _STEP * max(abs(value), size)) or _STEP
-        p, active = list(fitted.p), list(fitted.active)
-        if i is None:
-            p[at] = value + step
-        else:
-            active[i] = dataclasses.replace(active[i], values={**active[i].values, name: value + step})
-        moved = _simulated(problem, run, p, active)
-        for output, column in (moved or {}).items():
-            slopes[output][:, at] = (column - centre[output]) / step
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    spread = {name: columns @ root for name, columns in slopes.items()}
-    finer = [_simulated(problem, other, fitted.p, fitted.active) for other in dense]
-    known = [outputs for outputs in finer if outputs is not None]
-    if len(known) < len(finer):
+    values, covariance = _tamed(fitted)
+    known = [_simulated(problem, other, fitted, [0 * values])[0] for other in dense]
+    if any(outputs is None for outputs in known):
         return None
     between = {
-        name: np.array([_BETWEEN * (outputs[name][::2] - column) for outputs in known])
+        name: np.array([_BETWEEN * (outputs[name][::2] - column) for outputs in known if outputs is not None])
         .reshape(-1, run.rows)
         .T
-        for name, column in centre.items()
+        for name, column in predicted.outputs.items()
     }
-    return Predicted(outputs=centre, spread=spread, between=between)
+    root = _root(covariance)
+    # Away from zero: a time constant that is hardly known stays one.
+    away = [step * (1.0 if step @ np.sign(values) >= 0 else -1.0) for step in root.T]
+    begin = np.zeros(len(values))
+    begin[: len(fitted.p)] = [parameter.value for parameter in problem.free] - np.asarray(fitted.p)
+    steps = [*away, begin]
+    moved = _simulated(problem, run, fitted, steps)
+    ways = [
+        _lost(run, fitted.noise, predicted, outputs, np.linalg.pinv(root) @ step)
+        for step, outputs in zip(steps, moved, strict=True)
+        if outputs is not None  # beyond what the simulation runs with no fit goes
+    ]
+    lost = max(ways, default=0.0)
+    return dataclasses.replace(predicted, between=between, lost=lost)
 
 
-def _tamed(fitted: Fit, places: Sequence[tuple[int | None, str]]) -> Array:
-    """Return the covariance of a fit; what the recordings leave open altogether is as wide as its size."""
+def _lost(
+    run: Run, noise: dict[str, Autoregression], predicted: Predicted, moved: dict[str, Array], by: Array
+) -> float:
+    """Return what a fit misses that goes by derivatives, where half of a change is not as they say.
+
+    Such a fit may end anywhere: of a pendulum that goes over the top, of waves that are late by more than
+    half of one. ``by`` (n,) is what parameters are moved by, in standard deviations.
+    """
+    change = _white(run, {name: moved[name] - column for name, column in predicted.outputs.items()}, noise)
+    slope = _white(run, {name: columns @ by for name, columns in predicted.spread.items()}, noise)
+    size = float(change @ change)
+    along = float(change @ slope) ** 2 / max(float(slope @ slope), 1e-300)
+    return 0.0 if along >= size / 2 else 0.5 * (size - along)
+
+
+def _tamed(fitted: Fit) -> tuple[Array, Array]:
+    """Return the values (n,) of a fit, and their covariance (n, n).
+
+    What the recordings leave open altogether is as wide as its size.
+    """
     values = np.array(
-        [fitted.p[at] if i is None else fitted.active[i].values[name] for at, (i, name) in enumerate(places)]
+        [*fitted.p, *(applied.values[p.name] for applied in fitted.active for p in applied.searched)]
     )
     sd = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))
     limit = _WIDEST * np.maximum(np.abs(values), 1e-9)
     shrink = np.where(sd > limit, limit / np.where(sd > 0, sd, 1.0), 1.0)
-    return np.asarray(fitted.covariance * np.outer(shrink, shrink))
+    return values, np.asarray(fitted.covariance * np.outer(shrink, shrink))
+
+
+def _root(covariance: Array) -> Array:
+    """Return independent standard deviations (n, n), a column each."""
+    sizes, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))
 
 
 def _simulated(
-    problem: Problem, run: Run, p: Sequence[float], active: Sequence[AppliedEffect]
-) -> dict[str, Array] | None:
+    problem: Problem, run: Run, fitted: Fit, steps: Sequence[Array]
+) -> list[dict[str, Array] | None]:
+    """Return the outputs of a run with a fit's values moved by steps (n,), each; None where there are none.
+
+    Together where the simulation can: it is sooner, and what its own steps leave is no part of a difference.
+    """
+    points = [_moved(problem, fitted, step) for step in steps]
+    if problem.model.capability.together is not None:
+        problem.model.capability.together([run], points)
+    simulated: list[dict[str, Array] | None] = []
+    for values, active in points:
+        try:
+            outputs = problem.model.simulate(run, values, active)
+        except FitError:
+            simulated.append(None)
+            continue
+        numbers = {name: outputs[name] for name in problem.names}
+        finite = all(np.isfinite(column).all() for column in numbers.values())
+        simulated.append(numbers if finite else None)
+    return simulated
+
+
+def _moved(problem: Problem, fitted: Fit, step: Array) -> tuple[dict[str, float], tuple[AppliedEffect, ...]]:
+    """Return the parameters and effects of a fit, its values moved by a step (n,)."""
+    steps = iter(step.tolist())
     values = dict(problem.known)
-    values.update(zip((parameter.name for parameter in problem.free), map(float, p), strict=True))
-    try:
-        outputs = problem.model.simulate(run, values, tuple(active))
-    except FitError:
-        return None
-    numbers = {name: outputs[name] for name in problem.names}
-    return numbers if all(np.isfinite(column).all() for column in numbers.values()) else None
+    values |= {
+        parameter.name: float(value) + next(steps)
+        for parameter, value in zip(problem.free, fitted.p, strict=True)
+    }
+    active = tuple(
+        dataclasses.replace(
+            applied,
+            values={
+                **applied.values,
+                **{p.name: applied.values[p.name] + next(steps) for p in applied.searched},
+            },
+        )
+        for applied in fitted.active
+    )
+    return values, active
 
 
 def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, rival: Predicted) -> float:
@@ -215,13 +297,15 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
     The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
     identity). Each fit has taken what it does not explain for noise: the noise counts under which the two
     are less apart. What rows leave open by either is open to both. But a fit of the run takes simulations at
-    their rows for the truth: by what inputs that go straight between rows make of it, it is misled.
+    their rows for the truth: by what inputs that go straight between rows make of it, it is misled. And what
+    the true member's own fit may miss is not to be expected.
 
     Parameters
     ----------
     members : those of the two predictions
     """
-    return min(_divergence(run, member.fit.noise, true, rival) for member in members)
+    expected = min(_divergence(run, member.fit.noise, true, rival) for member in members)
+    return max(expected - true.lost, min(expected, 0.0))
 
 
 def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, rival: Predicted) -> float:

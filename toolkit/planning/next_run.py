@@ -19,8 +19,15 @@ from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.planning.drives import Drive
-from toolkit.planning.exchange import Alternatives, exchanged
-from toolkit.planning.members import Member, Predicted, denser, expected_log_evidence, predict
+from toolkit.planning.exchange import Alternatives, exchanged, is_less
+from toolkit.planning.members import (
+    Member,
+    Predicted,
+    completed,
+    denser,
+    expected_log_evidence,
+    predict,
+)
 from toolkit.planning.run_changes import RATES, Change, Level, RunLimits, changed, conditions, movable
 
 _SIZES = (0.0, 0.5, 1.0, 2.0, 4.0)
@@ -113,6 +120,15 @@ class RunSearch:
         predictions = None if run is None else self._predictions(run)
         if run is None or predictions is None:
             return -math.inf
+        worth = self._worth(run, predictions)
+        # What rows leave open, and whether derivatives hold, only lowers it: of a run that is no better
+        # without, nobody asks.
+        if not is_less(-worth, -max(self.judged.values(), default=-math.inf)):
+            return worth
+        predictions = self._completed(run, predictions)
+        return -math.inf if predictions is None else self._worth(run, predictions)
+
+    def _worth(self, run: Run, predictions: Sequence[Predicted]) -> float:
         apart = [gain for _, _, gain in self._pairs(run, predictions)]
         # Beyond certainty nothing is won: a run that parts further pairs is better than one that parts one
         # pair further. Of runs that are as good, the first counts, which is the nearest to the recording:
@@ -121,11 +137,14 @@ class RunSearch:
         return min(float(np.mean(worth)), _ENOUGH)
 
     def _predictions(self, run: Run) -> tuple[Predicted, ...] | None:
-        predictions = tuple(
-            predict(self.problem, member, run, self.dense.get(run, ())) for member in self.members
+        return _all_known(predict(self.problem, member, run) for member in self.members)
+
+    def _completed(self, run: Run, predictions: Sequence[Predicted]) -> tuple[Predicted, ...] | None:
+        dense = self.dense.get(run, ())
+        return _all_known(
+            completed(self.problem, member, run, predicted, dense)
+            for member, predicted in zip(self.members, predictions, strict=True)
         )
-        known = tuple(predicted for predicted in predictions if predicted is not None)
-        return known if len(known) == len(predictions) else None
 
     def _pairs(self, run: Run, predictions: Sequence[Predicted]) -> tuple[tuple[str, str, float], ...]:
         named = list(zip(self.members, predictions, strict=True))
@@ -200,11 +219,21 @@ class RunSearch:
         run = self._run(change)
         if new and run is not None:
             self._learn([run])
-        predictions = None if run is None else self._predictions(run)
+        rough = None if run is None else self._predictions(run)
+        predictions = None if run is None or rough is None else self._completed(run, rough)
         if run is None or predictions is None:
             return None
         pairs = self._pairs(run, predictions)
         return NextRun(change=change, run=run, pairs=pairs, predicted=predictions, power=power_of(pairs))
+
+
+def _all_known(predictions: Iterable[Predicted | None]) -> tuple[Predicted, ...] | None:
+    known = []
+    for predicted in predictions:
+        if predicted is None:
+            return None
+        known.append(predicted)
+    return tuple(known)
 
 
 def power_of(pairs: Sequence[tuple[str, str, float]]) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,36 +129,31 @@ def least_sweeps(
         for earlier, load in itertools.product(tires, loads_N)
         for length in ((earlier.lengths_m[load],) if load in earlier.lengths_m else PRIOR_M)
     ]
-    best: SweepChoice | None = None
-    for steering in _steerings():
-        speeds = tuple(_speeds(steering, sweeping))
-        if not speeds:
+
+    def seconds(design: SweepDesign) -> float:
+        return design.seconds(between_files_s=between_files_s, to_load_s=to_load_s)
+
+    steered = [
+        _Steered(
+            place=place, steering=steering, speed_sets=sets, cases=cases, sweeping=sweeping, demand=demand,
+            seconds=seconds,
+        )
+        for place, steering in enumerate(_steerings())
+        if (sets := tuple(_speed_sets(tuple(_speeds(steering, sweeping)), sweeping)))
+    ]  # fmt: skip
+    best: _Kept | None = None
+    hardest = 0
+    # What a sweep says of a tire takes long to foretell, and no case is served sooner with others beside it:
+    # the most hopeful steering first, and of the next ones that case first which was hardest.
+    for candidate in sorted(steered, key=lambda candidate: candidate.shortest((0,))[0]):
+        tell(f"sweeps over {candidate.steering.cycle_m / 2:.0f} m")
+        order = sorted(range(len(cases)), key=lambda at: at != hardest)
+        if best is not None and any(candidate.shortest((at,))[0] > best[0] for at in order):
             continue
-        tell(f"sweeps over {steering.cycle_m / 2:.0f} m")
-        basis = [_predicted(case, steering, sweeping) for case in cases]
-        for chosen in _speed_sets(speeds, sweeping):
-            designs = [
-                SweepDesign(
-                    steering=steering, speeds_m_s=chosen, cycles=cycles, loads_N=tuple(sorted(loads_N))
-                )
-                for cycles in itertools.product(_CYCLES, repeat=len(chosen))
-            ]
-            # The most cycles first. Noise falls with them: where they do not serve, no fewer do.
-            for design in (designs[-1], *designs[:-1]):
-                seconds = design.seconds(between_files_s=between_files_s, to_load_s=to_load_s)
-                longer = best is not None and best.feasible and seconds >= best.seconds
-                if longer and design is not designs[-1]:
-                    continue
-                judged = SweepChoice(
-                    design=design, seconds=seconds,
-                    reaches=tuple(
-                        _reach(case, fit, design, demand) for case, fit in zip(cases, basis, strict=True)
-                    ),
-                )  # fmt: skip
-                if best is None or _key(judged) < _key(best):
-                    best = judged
-                if design is designs[-1] and not judged.feasible:
-                    break
+        nearest = candidate.shortest(range(len(cases)))
+        if best is None or nearest[0] < best[0]:
+            best = nearest
+            hardest = int(np.argmax([reach.ratio for reach in nearest[1].reaches]))
     if best is None:
         raise ConfigError(
             "no sweep stays within what the machine can steer", where=f"machine {machine.name}, [sweeping]",
@@ -169,12 +164,59 @@ def least_sweeps(
             next_step="state the limits of the machine, or leave the relaxation length out",
             rule="plan-infeasible",
         )  # fmt: skip
-    return best
+    return best[1]
 
 
-def _key(choice: SweepChoice) -> tuple[float, float]:
-    # First that the demand is met, or how nearly, then the time.
-    return max(choice.worst, 1.0), choice.seconds
+_Kept = tuple[tuple[float, float, int], SweepChoice]
+"""A choice by what is best: that the demand is met, or how nearly, then the time, then the first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Steered:
+    # A steering with the speeds at which the machine makes it, and what it says of each case once asked.
+    place: int
+    steering: Steering
+    speed_sets: tuple[tuple[float, ...], ...]
+    cases: Sequence[_Case]
+    sweeping: Sweeping
+    demand: Demand
+    seconds: Callable[[SweepDesign], float]
+    known: dict[int, tuple[SweepFit, float]] = field(default_factory=dict)
+
+    def shortest(self, cases: Sequence[int]) -> _Kept:
+        """Return the shortest design that meets the demand in some cases, or that nearest to it."""
+        loads = tuple(sorted({case.load_N for case in self.cases}))
+        best: _Kept | None = None
+        for speeds in self.speed_sets:
+            *fewer, most = itertools.product(_CYCLES, repeat=len(speeds))
+            # The most cycles first. Noise falls with them: where they do not serve, no fewer do.
+            for cycles in (most, *fewer):
+                design = SweepDesign(steering=self.steering, speeds_m_s=speeds, cycles=cycles, loads_N=loads)
+                seconds = self.seconds(design)
+                if (
+                    best is not None
+                    and best[1].feasible
+                    and seconds >= best[1].seconds
+                    and cycles is not most
+                ):
+                    continue
+                reaches = tuple(
+                    _reach(self.cases[at], self._foretold(at), design, self.demand) for at in cases
+                )
+                judged = SweepChoice(design=design, reaches=reaches, seconds=seconds)
+                key = (max(judged.worst, 1.0), seconds, self.place)
+                if best is None or key < best[0]:
+                    best = key, judged
+                if cycles is most and not judged.feasible:
+                    break
+        if best is None:
+            raise ValueError("a steering without speeds")  # `least_sweeps` asks none
+        return best
+
+    def _foretold(self, at: int) -> tuple[SweepFit, float]:
+        if at not in self.known:
+            self.known[at] = _predicted(self.cases[at], self.steering, self.sweeping)
+        return self.known[at]
 
 
 def sweeping_for(demand: Demand, machine: Machine) -> Sweeping:

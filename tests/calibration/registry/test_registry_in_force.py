@@ -39,8 +39,21 @@ def test_before_every_record_is_an_error_that_lists_the_candidates(two: Registry
     with pytest.raises(RegistryError) as caught:
         two.in_force("hub", on=date(2026, 1, 31))
     assert "hub-r1 (in force from 2026-02-01)" in str(caught.value)
-    with pytest.raises(RegistryError):
-        two.in_force("nothing", on=date(2026, 1, 31))
+
+
+def test_an_instrument_without_records_is_refused_with_those_that_have_some(
+    two: Registry, tmp_path: Path
+) -> None:
+    with pytest.raises(RegistryError) as misspelt:
+        two.in_force("hubb", on=date(2026, 3, 1))
+    assert misspelt.value.rule == "no-record-in-force"
+    assert "no record of hubb" in str(misspelt.value.got)
+    assert str(misspelt.value.expected).startswith("an instrument with records: hub;")
+    assert "did you mean 'hub'" in str(misspelt.value.next_step)
+    with pytest.raises(RegistryError) as empty:
+        Registry(tmp_path / "empty").in_force("hub", on=date(2026, 3, 1))
+    assert "approved record" in str(empty.value.expected)
+    assert "did you mean" not in str(empty.value.next_step)
 
 
 def test_a_withdrawal_counts_from_the_day_it_became_known(two: Registry) -> None:

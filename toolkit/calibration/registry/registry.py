@@ -26,6 +26,7 @@ from toolkit.calibration.registry.stored import reason_of
 from toolkit.calibration.registry.witnessed import contradicted
 from toolkit.errors import RegistryError, ToolkitError
 from toolkit.files import sha256_bytes
+from toolkit.spelling import nearest
 from toolkit.trust.keys import Signer
 from toolkit.trust.signing import HERE, Signing, Travel
 
@@ -287,13 +288,18 @@ class Registry:
                 _status_text(status_of(record_id, ledger.of(record_id), known_on))
                 for record_id in ledger.entered()
             ]
+            others = [name for name in self.instruments() if name != instrument]
+            meant = nearest(instrument, others)
             raise RegistryError(
                 f"no calibration of {instrument} is in force on {on.isoformat()}",
                 where=self.folder / instrument,
-                got="; ".join(standings) or "no record",
-                expected=f"an approved record in force on {on.isoformat()}, "
-                f"as known on {known_on.isoformat()}",
-                next_step="approve one with 'toolkit calibration approve ID --in-force-from DATE'"
+                got="; ".join(standings) or f"no record of {instrument}",
+                expected=(
+                    "" if standings or not others else f"an instrument with records: {', '.join(others)}; "
+                )
+                + f"an approved record in force on {on.isoformat()}, as known on {known_on.isoformat()}",
+                next_step=("" if standings or meant is None else f"did you mean {meant!r}? Else ")
+                + "approve one with 'toolkit calibration approve ID --in-force-from DATE'"
                 + ", or make a draft with --calibration ID --draft" * drafts,
                 rule="no-record-in-force",
             )

@@ -30,7 +30,7 @@ _WRITTEN = (
     "plan.pdf", "plan.docx", "SESSION.toml", "loads.csv", "check.csv", "sheet.csv", "protocol.toml",
     "plan.toml", "next.csv", "predictions.csv", "operator.txt", "plan.txt", "plan.json",
 )  # fmt: skip
-_PICTURE = re.compile(r"next_\w{1,60}\.png")
+_PICTURE = re.compile(r"next_[\w-]{1,60}\.png", re.ASCII)
 # Fields of a form by the option that each stands for; what may be said several times is separated by commas.
 _OPTIONS: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"minutes": "--minutes", "loads": "--loads", "criterion": "--criterion"},

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import os
+import re
+import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,6 +48,7 @@ class PlanNextAnswer(NextRunPlan):
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
+_PLAIN, _APART = re.compile(r"[A-Za-z0-9_]{1,40}"), "_apart"
 
 
 def plan_next(
@@ -68,7 +72,7 @@ def plan_next(
     source : folder of ``toolkit diagnose --out``, or its diagnosis.json
     case : the case file; by default the one that the answer's model names
     limits, rates : ``NAME=LOW..HIGH`` in the channel's unit, ``NAME=MOST`` in that a second
-    budget_s : seconds of the search over runs
+    budget_s : seconds until the search over runs ends, a third of which it has in any case
     worker : limits of the case's own code; None runs it in this process
     template : of the sheet that stands in ``out`` beside the other files; None for none
 
@@ -91,6 +95,7 @@ def plan_next(
     from toolkit.planning.next_run import RunSearch
     from toolkit.planning.run_changes import Change, RunLimits, movable
 
+    begun = time.monotonic()
     stated = None if case is None else read_case(case)
     diagnosis, file = read_answer(source)
     effect = class_of(diagnosis, file)
@@ -109,7 +114,7 @@ def plan_next(
         tell("the members of the class")
         members = members_of(problem, diagnosis, effect)
         tell("runs")
-        ends = time.monotonic() + budget_s
+        ends = search_ends(begun, time.monotonic(), budget_s)
         search = RunSearch(
             problem=problem, members=members, limits=reach, until=lambda: time.monotonic() < ends,
             learn=(lambda _runs: None) if code is None else code.learn,
@@ -138,6 +143,15 @@ def plan_next(
         answer = dataclasses.replace(answer, document=written, files=tuple(files))
     text = plan_text(plan, answer.files, model=file.parent / "model.toml", out=out)
     return answer, text + document_text(answer.document)
+
+
+def search_ends(begun: float, now: float, budget_s: float) -> float:
+    """Return when a search ends that others had to be waited for: a third of its budget it has in any case.
+
+    >>> search_ends(0.0, 20.0, 45.0), search_ends(0.0, 40.0, 45.0)
+    (45.0, 55.0)
+    """
+    return max(begun + budget_s, now + budget_s / 3)
 
 
 def _case_of(file: Path) -> Path:
@@ -300,17 +314,20 @@ def plots(problem: Problem, members: Sequence[Member], chosen: NextRun) -> tuple
         )
 
     figures = []
-    for output in problem.model.outputs:
+    for place, output in enumerate(problem.model.outputs, start=1):
+        # A file has the output's name where that is one on every disk and in every address.
+        plain = _PLAIN.fullmatch(output.name) is not None and not output.name.endswith(_APART)
+        picture = f"next_{output.name if plain else f'output-{place}'}"
         columns = [predicted.outputs[output.name] for predicted in chosen.predicted]
         noise = members[0].fit.noise[output.name].marginal_sd
         figures += [
             plot(
-                output, f"next_{output.name}", output.name,
+                output, picture, output.name,
                 f"{output.name} in the run that is proposed, as each member of the class predicts it.",
                 columns,
             ),
             plot(
-                output, f"next_{output.name}_apart", f"{output.name} less that of {first}",
+                output, picture + _APART, f"{output.name} less that of {first}",
                 f"How far the predictions are from that of {first}; noise of {output.name} has a standard "
                 f"deviation of {noise:.3g} {output.unit.replace('*', '·')}.",
                 [column - columns[0] for column in columns],
@@ -348,9 +365,9 @@ def plan_text(plan: NextRunPlan, files: Sequence[str], *, model: Path, out: Path
     if files:
         folder = out or Path()
         lines += ["", *(f"written: {folder / name}" for name in files)]
-        pairs = [f"--condition {key}={value}" for key, value in _simulated(plan.conditions).items()]
-        rehearsal = ["toolkit simulate", str(model), f"--inputs {folder / INPUTS}", *pairs, "--out DIR"]
-        lines.append(f"  {' '.join(rehearsal)}")
+        stated = [("--condition", f"{key}={value}") for key, value in _simulated(plan.conditions).items()]
+        pairs = itertools.chain.from_iterable([("--inputs", str(folder / INPUTS)), *stated])
+        lines.append(f"  {shlex.join(['toolkit', 'simulate', str(model), *pairs, '--out', 'DIR'])}")
     return "\n".join(lines)
 
 
