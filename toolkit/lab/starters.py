@@ -337,7 +337,7 @@ def guess_case(name: str, columns: Sequence[Column]) -> Guess:
     unknown = units.keys() - roles.keys() - set(simulated.values())
     return Guess(
         values=values,
-        notes={"recording": f"guessed from {name}: forces and moments but the load are outputs"},
+        notes={"recording": f"guessed from {name} by names alone: FX, FY, MX, MY and MZ are outputs"},
         silent=tuple(f"{plain}: what it is to the simulation" for plain in units if plain in unknown),
     )
 
@@ -360,7 +360,7 @@ def _case(name: str, columns: Sequence[Column], texts: Collection[str]) -> Guess
     }
     times = [plain for plain, channel in known.items() if channel["role"] == "time"]
     notes = [
-        f"guessed from {name}, to be confirmed: forces and moments but the load are outputs",
+        f"guessed from {name} by names alone, to be confirmed: FX, FY, MX, MY and MZ are outputs",
         *(f"{plain} is the time, in s where its header states no unit" for plain in times),
     ]
     if proposed:
