@@ -14,7 +14,7 @@ class Law:
     """A law as it truly is; None: whatever is said of it is right."""
 
     kind: str
-    """``output`` or ``state``."""
+    """``output``, ``state``, or ``input``: of what drives a tire; several where the truth is of several."""
     channels: frozenset[str] | None
     forms: frozenset[str]
     variables: frozenset[str] | None
@@ -34,14 +34,14 @@ LAWS: dict[tuple[str, str], Law] = {
         (family, name): law
         for family in ("tire-machine", "tire-python", "tire-columns")
         for name, law in {
-            "hidden_ambient": _law("output", "FY MZ", "static", "T_AMBIENT", memory=False),
+            "hidden_ambient": _law("output input", "FY MZ friction", "static", "T_AMBIENT", memory=False),
             "hidden_resonance": _law("output", "FY", "mode", None, memory=True),
             "hidden_line": _law("output", "FY", "tone", "t", memory=False),
             "hidden_pulse": _law("output", "FY", "event", "t", memory=False),
         }.items()
     },
     # The cells share the force: each shows it.
-    ("tire-cells", "hidden_ambient"): _law("output", "", "static", "T_AMBIENT", memory=False),
+    ("tire-cells", "hidden_ambient"): _law("output input", "", "static", "T_AMBIENT", memory=False),
     ("tire-cells", "hidden_line"): _law("output", "", "tone", "t", memory=False),
     ("tire-cells", "hidden_pulse"): _law("output", "", "event", "t", memory=False),
     ("pendulum", "hidden_resonance"): _law("state", "om", "mode", None, memory=True),
@@ -91,7 +91,8 @@ def _held(true: Law, law: dict[str, Any]) -> dict[str, bool]:
     said = variables | ({"t"} if form in ("event", "tone") else frozenset())
     return {
         "learned": True,
-        "place": place.get("kind") == true.kind and (channels is None or place.get("channel") in channels),
+        "place": place.get("kind") in true.kind.split()
+        and (channels is None or place.get("channel") in channels),
         "variables": form in true.forms and (true.variables is None or said == true.variables),
         "memory": true.memory is None
         or true.memory == (law.get("memory_s") is not None or form in ("mode", "loop")),

@@ -14,6 +14,7 @@ import pytest
 
 from tests.report.template_factory import make, p
 from toolkit import system
+from toolkit.__main__ import main
 from toolkit.simulation.plan import read_plan
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "toolkit" / "examples" / "virtual"
@@ -170,3 +171,16 @@ def test_modules_that_only_some_systems_have_are_imported_in_two_places() -> Non
         path.relative_to(root).as_posix() for path in root.rglob("*.py") if foreign.search(path.read_text())
     }
     assert places <= {"system.py", "worker/posix.py"}
+
+
+@pytest.mark.parametrize(("said", "threads"), [(None, "1"), ("3", "3")])
+def test_the_command_line_keeps_linear_algebra_on_one_thread(monkeypatch, said, threads):
+    """Two threads on a shared core wait for each other: a decomposition took a hundred times as long."""
+    for name in system.THREADS:
+        monkeypatch.delenv(name, raising=False)
+        if said is not None:
+            monkeypatch.setenv(name, said)
+    monkeypatch.setattr("sys.argv", ["toolkit", "fit", "--help"])
+    with pytest.raises(SystemExit):
+        main()
+    assert {os.environ[name] for name in system.THREADS} == {threads}

@@ -13,7 +13,9 @@ def main() -> None:
         print(f"toolkit {__version__}")  # noqa: T201
         return
     from toolkit.cli.main import run
+    from toolkit.system import one_thread
 
+    one_thread()
     run()
 
 

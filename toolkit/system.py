@@ -34,7 +34,20 @@ WITHOUT_WAITING: int = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
 NO_FILE = -1
 """Stands for the handle of a folder where folders cannot be opened."""
 
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables of the environment by which linear algebra is told how many threads to start."""
+
 _NO_LOCKS = frozenset((errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS))
+
+
+def one_thread() -> None:
+    """Keep linear algebra, when it is loaded, on one thread, unless whoever called says otherwise.
+
+    Its matrices have a few columns here. Threads would only wait for each other, and where another program
+    has the second core they wait a hundred times as long as one of them computes.
+    """
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
 
 
 def has_folder_locks() -> bool:

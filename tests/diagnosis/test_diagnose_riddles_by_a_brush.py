@@ -185,3 +185,30 @@ def test_five_repeats_of_which_two_had_a_slower_actuator(tmp_path):
     (told,) = [one for one in found.next_measurements if one.startswith("To tell load_lag from ")]
     assert "viscoelastic_settling" in told
     assert "the load recorded beside its command" in told
+
+
+@pytest.mark.campaign("a whole search: responses of such laws are held in every run (test_trial_scales)")
+def test_a_grip_that_has_a_bump_over_the_temperature_is_a_law_of_the_friction(tmp_path):
+    """No factor of one output is it: where the patch sticks nothing changes, and the trail shifts."""
+    rng = np.random.default_rng(3)
+    runs = []
+    for seed in range(3):
+        frame = steps(loads=(4000.0,))
+        T = 24 + 2.5 * np.sin(np.arange(len(frame)) / 11 + rng.uniform(0, 6))
+        grip = 1 + 0.12 * np.exp(-(((T - 24.5) / 0.8) ** 2))
+        runs.append(noisy(seed, frame.assign(T_AMBIENT=T), *brush(frame["SA"], frame["FZ"], mu=grip)))
+    path = case(tmp_path, runs)
+    text = path.read_text().replace("FY = {", 'T_AMBIENT = { unit = "degC", role = "covariate" }\nFY = {', 1)
+    path.write_text(text)
+    found = diagnose(read_case(path), None).diagnosis
+    assert (found.verdict, found.effects) == ("unknown", ())
+    law = found.laws[0]
+    assert (law.place.kind, law.place.channel, law.acts) == ("input", "friction", "multiplies")
+    assert law.variables == ("T_AMBIENT",)
+    sizes = {each.name: each.ci95 for each in law.parameters}
+    for name, true in {"a": 0.12, "c": 24.5, "w": 0.8}.items():
+        low, high = sizes[name]
+        assert low - (high - low) / 2 < true < high + (high - low) / 2
+    for output in found.fit.held_out:
+        assert output.with_laws_rmse < 1.1 * output.noise_floor < output.refitted_rmse
+    assert "friction of the tire * (1 + " in law.sentence

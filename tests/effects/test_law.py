@@ -8,9 +8,9 @@ import pytest
 from toolkit.diagnosis.simulators.forces import Forces
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effect
-from toolkit.effects.forward import through
+from toolkit.effects.forward import through, tire_forces
 from toolkit.effects.law import conversion, law_effect, law_name
-from toolkit.effects.signals import Setting
+from toolkit.effects.signals import Setting, TireForces, drive
 from toolkit.errors import ConfigError
 
 T = np.arange(5.0)
@@ -82,3 +82,31 @@ def test_a_law_without_its_channel_says_which_one_is_missing():
     with pytest.raises(ConfigError, match="not recorded") as caught:
         _through("law adds: a*[x]", np.zeros(5), {"a": 1.0})
     assert caught.value.expected == "x"
+
+
+@pytest.mark.parametrize("friction", [0.8, 1.0, 1.3])
+def test_a_law_of_friction_is_a_brush_on_another_road(friction):
+    """FY and MZ of a brush depend on mu as the similarity has it (Pacejka 2012, 3.2 and 4.2.1)."""
+    slip, load, stiffness = np.linspace(-0.2, 0.2, 5), 4000.0, 60e3
+
+    def brush(slip, mu):
+        x = np.minimum(np.abs(stiffness * slip / (3 * mu * load)), 1.0)
+        grip, stuck = mu * load * np.sign(slip), (1 - x) ** 3
+        return TireForces(FY=-grip * (1 - stuck), MZ=0.05 * grip * x * stuck)
+
+    applied = AppliedEffect(effect=effect("law scales friction: a*[T]"), values={"a": 0.1})
+    forces = tire_forces(
+        drive(T, slip, np.full(5, load)),
+        lambda alpha, _: brush(alpha, 1.0),
+        [applied],
+        _setting(T=np.full(5, 10 * (friction - 1))),
+    )
+    there = brush(slip, friction)
+    np.testing.assert_allclose(forces.FY, there.FY, rtol=1e-12)
+    np.testing.assert_allclose(forces.MZ, there.MZ, rtol=1e-12)
+
+
+def test_what_drives_a_tire_is_scaled_by_no_output():
+    with pytest.raises(ConfigError, match="scales stiffness") as caught:
+        law_effect("law scales stiffness: a*[itself]")
+    assert caught.value.rule == "law-formula"

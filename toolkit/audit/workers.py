@@ -23,6 +23,7 @@ from typing import Generic, TypeVar
 
 from toolkit.errors import ConfigError
 from toolkit.inputs import raise_limits, raised_to
+from toolkit.system import THREADS
 
 Result = TypeVar("Result")
 
@@ -30,7 +31,6 @@ TIMEOUT_S = 120.0
 _BYTES_PER_S = 2**19  # a slow machine under load reads and judges as much
 DIED = "worker-died: the reader's process ended without an answer"
 MEMORY_BYTES = 4 << 30
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _TRIES = 3
 _CYCLES = 20_000  # new objects until they are looked through
 _AHEAD = 16  # files in a worker's pipe: it never waits for the next one
@@ -192,8 +192,8 @@ def under_limits(raised: int, make: Callable[[], Callable[[str], Result]]) -> Ca
 @contextlib.contextmanager
 def _one_thread() -> Iterator[None]:
     # Each worker is one core's work: libraries that start threads of their own would only get in its way.
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
         yield
     finally:

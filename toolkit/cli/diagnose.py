@@ -49,7 +49,6 @@ def command(
 
     Example: toolkit diagnose case.toml --out answer
     """
-    _one_thread()
     from toolkit.declared import answer
     from toolkit.lab.answers import document_text
     from toolkit.lab.home import home_template
@@ -72,14 +71,6 @@ def command(
     warned = payload.document is not None and bool(payload.document["warnings"])
     output.answer(answer(payload), text + document_text(payload.document))
     return 0 if diagnosed.result.diagnosis.verdict == "nothing" and not warned else 1
-
-
-def _one_thread() -> None:
-    """Keep linear algebra on one thread: its matrices are small, and threads only wait for each other."""
-    import os
-
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 def _teller(*, show: bool) -> Any:

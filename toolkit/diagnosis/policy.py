@@ -154,12 +154,8 @@ class _Averages:
     fewest: int = _set(32, "means of all runs", "as many must be left to judge by")
     window: int = _set(256, "rows", "of a window of the spectra: five octaves and more")
     windows: int = _set(4, "windows side by side", "fewer are alike by chance")
-    shortest: int = _set(
-        16, "rows of a window", "three octaves: a shorter one tells nothing of quick changes"
-    )
-    bent: float = _set(
-        0.5, "of what is not followed", "stays where a bend is missing; noise stays by any bend"
-    )
+    shortest: int = _set(16, "rows of a window", "three octaves: a shorter one tells no quick changes")
+    bent: float = _set(0.5, "of what is not followed", "stays where a bend is missing, as noise by any")
     missed: float = _set(
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
     )
@@ -233,6 +229,8 @@ class _Starts:
     subsets: int = _set(
         8, "groups of runs by one condition", "each is one test more; the first are likeliest"
     )
+    beyond: float = _set(0.01, "of the rows, and of their range", "where an effect shows nothing: refuted")
+    beyond_sd: float = _set(5.0, "sd of the noise", "beyond what an effect can show: no noise of some rows")
     late: tuple[int, ...] = _set((1, 4, 12), "rows", "delays of a plant whose rows are far apart")
 
 
@@ -393,6 +391,9 @@ class _Structure:
     )
     foretold_draws: int = _set(399, "series of the residual's colour", "none of which is foretold as well")
     line: float = _set(1e-8, "p-value of a spectral line", "the noise's own resonances are lines as well")
+    swings: float = _set(
+        0.5, "of a channel's variance", "in one line: it swings, and what is bent answers it"
+    )
     line_share: float = _set(0.05, "of a residual's variance", "a line with less matters to nobody")
     line_around: int = _set(12, "frequencies on each side", "whose median is the level below a line")
     line_rows: int = _set(64, "rows of a run", "a shorter one has too few frequencies for a level")
@@ -430,6 +431,8 @@ class _Laws:
     knots: int = _set(7, "knots of a curve", "as many as the structure was found with")
     times: int = _set(7, "time constants", "geometrically from two rows to a quarter of the recording")
     tones: int = _set(81, "frequencies", "within one line of a spectrum to either side: 40 to a line")
+    locked: int = _set(8, "frequencies", "to a line of the whole session, for a tone whose phase goes on")
+    locked_most: int = _set(4000, "frequencies", "runs farther apart share no phase of one tone")
     ends: int = _set(81, "times of a run", "between which an event in an equation may begin and end")
     apart: float = _set(1e-12, "of a response", "squared, of two steps in an equation: less is rounding")
     columns: int = _set(4_000_000, "numbers of a response", "of laws in an equation propagated together")
@@ -451,11 +454,9 @@ class _Verdict:
     close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
     mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
     nearly: float = _set(
-        0.9, "of the held-out mean square above the noise", "effects that take it stay, whatever the rest is"
+        0.9, "of what is above the noise, squared", "effects that take it stay whatever the rest is"
     )
-    taken: float = _set(
-        2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"
-    )
+    taken: float = _set(2 / 3, "of what is above the noise, squared", "named effects take, in one output")
     accuracy: float = _set(
         0.01,
         "of an output's spread",
@@ -471,9 +472,7 @@ class _Verdict:
     of_a_run: float = _set(
         0.5, "of the longest run", "a later channel has fewer rows to show it than it loses"
     )
-    observable: float = _set(
-        1e-3, "of a response", "left by the nominal parameters, or nothing is seen of it"
-    )
+    observable: float = _set(1e-3, "of a response", "beside the nominal parameters, or nothing is seen of it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -486,9 +485,7 @@ class _Location:
     whole: float = _set(0.95, "of the rows", "a range as wide is all that was recorded")
     ranges: int = _set(3, "ranges", "told of one mismatch, the narrowest first")
     listed: int = _set(8, "values left out", "named one by one: a page of them says no more")
-    run: float = _set(
-        0.2, "of the mean energy of a run", "a run with less is not named among those of a range"
-    )
+    run: float = _set(0.2, "of a run's mean energy", "a run with less is not named among those of a range")
 
 
 BUDGET, WORKER, ROWS, PRIORS, NOISE = _Budget(), _Worker(), _Rows(), _Priors(), _Noise()

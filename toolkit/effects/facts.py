@@ -48,10 +48,11 @@ class ChannelFacts:
     into a channel that was recorded disturbed, it must not follow that channel's noise. ``about_zero`` says
     that it depends on where the channel has its zero, which is then the recording's first value where the
     scale has a zero by convention alone. ``directed`` says that it concerns a direction, which a
-    channel with such a zero does not have. ``between_rows``
-    says that it shows what happened between two rows. ``proportion`` says that it is one factor of the
-    channel, and what has to be added to its parameter to give it. ``inverse`` takes it away exactly; without
-    it, a fixed point does.
+    channel with such a zero does not have.
+    ``between_rows`` says that it shows what happened between two rows. ``proportion`` says that it is one
+    factor of the channel, and what has to be added to its parameter to give it. ``image`` are the ends of
+    what the channel can show whatever is simulated: a recording beyond them refutes the effect. ``inverse``
+    takes it away exactly; without it, a fixed point does.
     """
 
     where: tuple[Where, ...]
@@ -63,6 +64,7 @@ class ChannelFacts:
     usual: str | None = None
     between_rows: bool = False
     proportion: float | None = None
+    image: tuple[float, float] | None = None
     inverse: InverseHook | None = None
 
     @property

@@ -1,9 +1,10 @@
 """A law without a name as an effect: what a diagnosis learned of structure that no effect explains.
 
 Its name is its formula and how it acts, so that a model file, a worker and a fit mean the same by it:
-``law adds: a*tanh([SA]/s)``. It acts on an output (``adds`` to it, ``multiplies`` it), or ``enters`` the
-equation of a state, where it is taken from the state's rate. Signals are in the units of the recording:
-an applied law carries the factor and zero by which its setting's SI values become those.
+``law adds: a*tanh([SA]/s)``. It acts on an output (``adds`` to it, ``multiplies`` it), ``scales`` what drives
+a tire (its friction or its stiffness; a trail's law is one of MZ), or ``enters`` the equation of a state,
+where it is taken from the state's rate. Signals are in the units of the recording: an applied law carries
+the factor and zero by which its setting's SI values become those.
 
 ``a*tanh([SA]/s)`` has the signal SA and the parameters a and s. A formula comes from a file as well, so it
 is read and never run: a tree of which only the arithmetic, the functions and the operators with a memory
@@ -18,7 +19,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
@@ -33,11 +34,12 @@ if TYPE_CHECKING:
     from toolkit.arrays import Array
 
     Part = Callable[[Mapping[str, Any], Mapping[str, float], Any], Any]
-    from toolkit.effects.signals import Setting
+    from toolkit.effects.signals import Drive, Setting, Tire
 
 
 _LONGEST = 2_000  # characters: a formula that a person reads has fewer than a hundred
 _LARGEST_POWER = 9
+_LEAST = 0.05  # of a tire's friction or stiffness
 _SIGNAL = re.compile(r"\[([^\[\]]+)\]")
 _INSIDE = "__"  # what stands for a bracket while Python's parser reads the rest; no parameter begins so
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -48,7 +50,9 @@ _STATIC: dict[str, Callable[..., Any]] = {
     "abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "exp": np.exp, "tanh": np.tanh, "sin": np.sin,
     "cos": np.cos, "max": np.maximum, "min": np.minimum,
 }  # fmt: skip
-Acts = Literal["adds", "multiplies", "enters"]
+Acts = Literal["adds", "multiplies", "enters", "scales friction", "scales stiffness"]
+SCALED = {acts: acts.removeprefix("scales ") for acts in get_args(Acts) if acts.startswith("scales ")}
+"""Of a law that scales a tire: the field of its `signals.Drive`."""
 ITSELF = "itself"
 """The signal that is the channel or the state that a law acts on."""
 POSITION = "position"
@@ -312,13 +316,16 @@ def law_effect(name: str) -> Effect:
     Raises
     ------
     ConfigError
-        ``law-formula``: its formula cannot be read, or remembers where it enters an equation
+        ``law-formula``: its formula cannot be read, remembers where it enters an equation, or reads what it
+        scales
     """
     acts, law = parts_of(name)
-    if acts == "enters" and law.has_memory:
+    refused = {"enters": law.has_memory} | dict.fromkeys(SCALED, ITSELF in law.signals)
+    if refused.get(acts):
         raise ConfigError(
-            "a law cannot enter an equation", where=name[:200], got=law.plain(),
-            expected="a formula of states, inputs and the time without memory",
+            f"a law cannot act so: it {acts}", where=name[:200], got=law.plain(),
+            expected="a formula of states, inputs and the time without memory" if acts == "enters"
+            else "a formula of recorded channels and the time",
             next_step="take the law as a diagnosis has written it", rule="law-formula",
         )  # fmt: skip
 
@@ -327,9 +334,15 @@ def law_effect(name: str) -> Effect:
             change = np.asarray(law(_signals(law, y, values, setting), values, setting.t), dtype=np.float64)
         return y * (1 + change) if acts == "multiplies" else y + change
 
+    def scaled(drive: Drive, values: Values, setting: Setting, _: Tire) -> Drive:
+        with np.errstate(all="ignore"):
+            change = law(_signals(law, drive.SA, values, setting), values, setting.t)
+        before = getattr(drive, SCALED[acts])
+        return replace(drive, **{SCALED[acts]: before * np.maximum(1 + change, _LEAST)})
+
     return Effect(
         name=name,
-        stage="dynamics" if acts == "enters" else "acquisition",
+        stage="dynamics" if acts == "enters" else "tire" if acts in SCALED else "acquisition",
         rank=99,
         in_time=law.in_time,
         statement=_STATEMENTS[acts],
@@ -338,10 +351,11 @@ def law_effect(name: str) -> Effect:
         signature="",
         separates="",
         parameters=tuple(_parameter(parameter) for parameter in law.parameters),
-        channel=None if acts == "enters" else added,
-        on_channel=None
-        if acts == "enters"
-        else ChannelFacts(where=("output",), tare="own", by_value=ITSELF in law.signals),
+        drive=scaled if acts in SCALED else None,
+        channel=added if acts in ("adds", "multiplies") else None,
+        on_channel=ChannelFacts(where=("output",), tare="own", by_value=ITSELF in law.signals)
+        if acts in ("adds", "multiplies")
+        else None,
         term=Term(of="state", law=law, reads=law.signals) if acts == "enters" else None,
     )
 
@@ -350,9 +364,11 @@ _STATEMENTS: dict[Acts, str] = {
     "adds": "A law without a name adds to the channel.",
     "multiplies": "A law without a name multiplies the channel.",
     "enters": "A law without a name is missing in the state's equation.",
+    **{acts: f"A law without a name scales the tire's {of}." for acts, of in SCALED.items()},
 }
 _EQUATIONS: dict[Acts, str] = {
     "adds": "y = y_model + {}", "multiplies": "y = y_model * (1 + {})", "enters": "x' = ... - ({})",
+    **{acts: of + " = 1 + {}" for acts, of in SCALED.items()},
 }  # fmt: skip
 
 

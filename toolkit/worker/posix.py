@@ -22,14 +22,13 @@ from pathlib import Path
 from typing import NoReturn
 
 from toolkit.errors import ConfigError
-from toolkit.system import can_fork
+from toolkit.system import THREADS, can_fork
 from toolkit.worker.walls import Walls, libc
 
 with contextlib.suppress(ModuleNotFoundError):  # another system: `begin` refuses there
     import fcntl
     import resource
 
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _ALLOCATORS = frozenset({"jemalloc_bg_thd"})  # Arrow's, which pandas loads: jemalloc is ready for forks
 _PDEATHSIG, _SUBREAPER = 1, 36  # of prctl(2)
 _LOOK_S = 0.05  # between two counts of the worker's processes: a bomb of Python has some dozens by then
@@ -119,7 +118,7 @@ def _executed(limits: Limits, high: list[int], scratch: str) -> int:
         f"main({limits.numbers()!r}, {scratch!r}, {os.getpid()})"
     )
     places = [(os.POSIX_SPAWN_DUP2, end, at) for end, at in zip(high, (SOCKET, OUTPUT, STATUS), strict=True)]
-    environment = {**dict.fromkeys(_THREADS, "1"), **os.environ}
+    environment = {**dict.fromkeys(THREADS, "1"), **os.environ}
     return os.posix_spawn(sys.executable, [sys.executable, "-c", text], environment, file_actions=places)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace as Of
 
 import numpy as np
@@ -38,6 +39,16 @@ def found(*variables, inputs=("SA", "FZ"), unit="N", reason="", line=None):
 def test_the_advice_is_about_what_the_mismatch_depends_on(variable, told):
     (said,) = to_find_it(found(variable))
     assert told in said
+
+
+def test_what_differs_from_run_to_run_as_a_recorded_level_does_is_looked_for_there():
+    """A damper's gas at three pressures: three runs, and no other note of what changed between them."""
+    search = found("run", inputs=("v", "p"))
+    for level in (345.0, 689.0, 1034.0):
+        columns = {"v": np.linspace(-1, 1, 50), "p": level + np.linspace(0, 2, 50)}
+        search.problem.runs += (Of(columns=columns, rows=50),)
+    (said,) = to_find_it(search)
+    assert "as p does: change p within a run" in said
 
 
 @pytest.mark.parametrize(
@@ -105,6 +116,26 @@ def test_a_line_in_step_with_a_recorded_angle_is_told_by_its_number_per_turn(spe
         search.problem.runs += (Of(t=t + 3, columns={"angle": angle}, rows=len(t)),)
     (said,) = to_find_it(search)
     assert "24 Hz" in said
+    assert told in said
+
+
+@pytest.mark.parametrize(
+    ("swing", "bent", "told"),
+    [
+        (1.0525, 3.1575, "3 times as fast as SA: it answers to SA"),
+        (1.0525, 1.0525, "swings at 1.052 Hz, as fast as SA: it answers to SA"),
+        (1.0525, 2.6, "record what turns"),
+        (0.11, 5.0, "record what turns"),  # among so many multiples any line would be
+    ],
+)
+def test_a_line_at_a_multiple_of_an_inputs_swing_is_an_answer_to_it(swing, bent, told):
+    """A damper's valve bends its force: three times its stroke's frequency, and nothing else turns."""
+    t = np.arange(0, 30, 0.01)
+    search = found("time", reason="a line", line=replace(line(bent), width=1 / 30))
+    for phase in (0.0, 1.0):
+        columns = {"SA": 5 * np.sin(2 * np.pi * swing * t + phase), "FZ": np.full(len(t), 4000.0)}
+        search.problem.runs += (Of(t=t, columns=columns, rows=len(t)),)
+    (said,) = to_find_it(search)
     assert told in said
 
 

@@ -125,15 +125,33 @@ def test_what_prediction_errors_show_is_not_nothing_where_free_simulation_cannot
     assert (("speed",), "from row to row") in [(by.variables, by.reason) for by in drifting.depends_on]
 
 
-def test_where_positions_are_the_sum_of_what_came_before_their_squares_are_not_made_least(
+def test_where_positions_are_the_sum_of_what_came_before_the_squares_of_rates_are_made_least(
     tmp_path, monkeypatch
 ):
-    """Not even where the specification test would have it: that test compares squares of positions."""
+    """Where the specification test trusts least squares, they are those of what counts: of the rates."""
     monkeypatch.setattr(importlib.import_module("toolkit.diagnosis.fit.fit"), "_absorbs", lambda *_: True)
     case = written(tmp_path, runs(2, zero=0.3))
     problem = problem_of(case, model_of(case, None))
-    told = fit(problem)
-    assert [told.plain, fit(judged_by_rates(problem, told)).plain] == [True, False]
+    by_positions = fit(problem)
+    drifting = judged_by_rates(problem, by_positions)
+    by_rates = fit(drifting)
+    assert by_positions.plain
+    assert by_rates.plain
+
+    def squares(made, of):
+        return float(np.sum(of.judged("position", made.residual["position"]) ** 2))
+
+    assert squares(by_positions, problem) < squares(by_rates, problem)
+    assert squares(by_rates, drifting) < squares(by_positions, drifting)
+
+
+def test_least_squares_of_rates_tell_the_parameters_within_their_interval(tmp_path):
+    """A cart whose steady forces nobody simulates: coloured noise may take them, and its mass is 5 kg."""
+    case = written(tmp_path, runs(3, seed=4, zero=0.3))
+    problem = problem_of(case, model_of(case, None))
+    made = fit(judged_by_rates(problem, fit(problem)), plain=True)
+    for k, true in enumerate((5.0, 4.0)):
+        assert abs(made.p[k] - true) < 3 * np.sqrt(made.covariance[k, k])
 
 
 def test_what_leaves_larger_rates_than_before_explains_the_noise_and_not_the_motion(tmp_path):

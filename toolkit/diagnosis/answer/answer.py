@@ -139,7 +139,7 @@ class DiagnosedEffect:
 class LawPlace:
     """Where a law acts."""
 
-    kind: Literal["output", "state"]
+    kind: Literal["output", "state", "input"]
     channel: str
 
 
@@ -201,6 +201,8 @@ class DiagnosedLaw:
         law = self.formula or f"a curve of {' and '.join(self.variables)}"
         if self.place.kind == "state":
             text = f"in the equation of {channel}: d{channel}/dt = ... + {law}"
+        elif self.place.kind == "input":
+            text = f"{channel} of the tire * (1 + {law})"
         elif self.acts == "multiplies":
             text = f"{place} * (1 + {law})"
         else:

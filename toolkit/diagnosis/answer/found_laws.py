@@ -18,11 +18,12 @@ from toolkit.diagnosis.answer.answer import (
 )
 from toolkit.diagnosis.law.trial import amplitudes
 from toolkit.diagnosis.policy import LAWS, VERDICT
-from toolkit.effects.law import formula
+from toolkit.effects.law import SCALED, formula
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
     from toolkit.diagnosis.law.learn import Law, Laws
+    from toolkit.diagnosis.law.trial import Trial
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
 
@@ -59,9 +60,9 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
     for signal in trial.signals:
         plain = plain.replace(signal.written.strip("[]"), signal.name) if trial.acts == "enters" else plain
     return DiagnosedLaw(
-        place=LawPlace(kind="state" if trial.acts == "enters" else "output", channel=str(fitted.channel)),
+        place=_place(trial),
         form=trial.form,
-        acts="multiplies" if trial.acts == "multiplies" else "adds",
+        acts="adds" if trial.acts in ("adds", "enters") else "multiplies",
         variables=tuple(signal.name for signal in trial.signals),
         memory_s=_memory(fitted),
         formula=None if shaped else plain,
@@ -86,6 +87,13 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
             share_of_gap=min(max(law.share, 0.0), 1.0),
         ),
     )  # fmt: skip
+
+
+def _place(trial: Trial) -> LawPlace:
+    """Return where a law acts: on an output, in the equation of a state, or on what drives the tire."""
+    if trial.acts in SCALED:
+        return LawPlace(kind="input", channel=SCALED[trial.acts])
+    return LawPlace(kind="state" if trial.acts == "enters" else "output", channel=str(trial.applied.channel))
 
 
 def _interval(value: float, half: float, *, positive: bool) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import DiagnosedEffect, Verdict, cut_short, untested
 from toolkit.diagnosis.fit.problem import Problem
-from toolkit.diagnosis.policy import PRIORS, STRUCTURE, VERDICT
+from toolkit.diagnosis.policy import LOCATION, PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import beyond_noise
@@ -19,6 +19,7 @@ from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit, with_unit
 
 if TYPE_CHECKING:
+    from toolkit.arrays import Array
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.unexplained import Line
 
@@ -186,8 +187,12 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     if lines:
         sentences += _swinging(search.problem, lines, subject)
     if "run" in variables:
+        levels = " and ".join(_levels(search.problem))
         sentences.append(
-            f"{subject} differs from run to run: repeat one run unchanged, and note what else changed."
+            f"{subject} differs from run to run, as {levels} does: change {levels} within a run, or have "
+            "runs at more of its values, each twice."
+            if levels
+            else f"{subject} differs from run to run: repeat one run unchanged, and note what else changed."
         )
     if "time" in variables:
         sentences.append(f"{subject} goes with time: {_TO_PART_TIME[min(len(inputs), 2)].format(*inputs)}.")
@@ -218,11 +223,33 @@ _AT_ANOTHER_SPEED = (
 )
 
 
+def _levels(problem: Problem) -> list[str]:
+    """Return the recorded inputs that stand still in every run, and have another value in another run."""
+    standing = []
+    for channel in problem.case.drivers:
+        columns = [run.columns.get(channel.name, np.zeros(0)) for run in problem.runs]
+        columns = [column[np.isfinite(column)] for column in columns]
+        if len(columns) < 2 or not all(len(column) for column in columns):
+            continue
+        among = np.ptp([np.mean(column) for column in columns])
+        if among > 0 and max(np.std(column) for column in columns) < LOCATION.run * among:
+            standing.append(channel.name)
+    return standing
+
+
 def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str]:
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
     for line in lines:
-        order = _order(problem, line.frequency)
+        order, answered = _order(problem, line.frequency), _answered(problem, line)
+        if order is None and answered is not None:
+            name, multiple = answered
+            times = "as fast" if multiple == 1 else f"{multiple} times as fast"
+            sentences.append(
+                f"{subject} swings at {line.told}, {times} as {name}: it answers to {name}. "
+                f"Repeat the run with {name} half as large, and with {name} half as fast."
+            )
+            continue
         if order is None:
             unturned.append(line.told)
             continue
@@ -234,6 +261,35 @@ def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str
         listed = " and ".join(unturned)
         sentences.append(f"{subject} swings at {listed}: record what turns or swings at this frequency.")
     return sentences
+
+
+def _answered(problem: Problem, line: Line) -> tuple[str, int] | None:
+    """Return the recorded input whose own swing has a line [Hz] among its multiples, and which it is.
+
+    What is bent answers to a swing by its multiples, and nothing else has to turn there.
+    """
+    for channel in problem.case.drivers:
+        multiples = [_multiple(line, run.t, run.columns.get(channel.name)) for run in problem.runs]
+        if multiples and None not in multiples and len(set(multiples)) == 1:
+            return channel.name, int(multiples[0] or 0)
+    return None
+
+
+def _multiple(line: Line, t: Array, values: Array | None) -> int | None:
+    """Return which multiple of a column's own swing a line is in one run; None where it has none so clear."""
+    if values is None or len(t) < STRUCTURE.line_rows or not np.isfinite(values).all():
+        return None
+    even = np.interp(np.linspace(t[0], t[-1], len(t)), t, values)
+    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(t)))) ** 2
+    k = int(np.argmax(power))
+    if k < STRUCTURE.line_cycles or power[k - 1 : k + 2].sum() < STRUCTURE.swings * power.sum():
+        return None
+    width = 1 / float(t[-1] - t[0])
+    multiple = round(line.frequency / (k * width))
+    unsure = multiple * width / 2 + line.width / 2
+    near = abs(line.frequency - multiple * k * width) <= unsure
+    # Among so wide multiples any line would be.
+    return multiple if near and multiple and unsure < STRUCTURE.order_cycles * k * width else None
 
 
 def _order(problem: Problem, frequency: float) -> tuple[str, float] | None:

@@ -12,13 +12,14 @@ The vector is that of a joint fit (`Space`): free parameters, then the effects' 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Autoregression, Layout, whiten
+from toolkit.diagnosis.fit.noise import Autoregression, Differences, Layout, whiten
 from toolkit.diagnosis.policy import PRIORS
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
@@ -92,15 +93,33 @@ class Derivatives:
 
 
 class Weighing:
-    """What rows are worth: their layouts and noise, and the priors beside them."""
+    """What rows are worth: their layouts and noise, and the priors beside them.
 
-    def __init__(self, space: Space, layouts: dict[str, Layout], noise: dict[str, Autoregression]) -> None:
-        self._space, self._layouts, self._noise = space, layouts, noise
+    Of an output in ``drifting`` what counts are its differences, and the noise is theirs.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        layouts: dict[str, Layout],
+        noise: dict[str, Autoregression],
+        drifting: Mapping[str, Differences] = MappingProxyType({}),
+    ) -> None:
+        self._space, self._noise, self._drifting = space, noise, drifting
+        self._layouts = {
+            name: drifting[name].layout if name in drifting else where for name, where in layouts.items()
+        }
 
     def _whitened(self, values: Stacked) -> Array:
         with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away is large, no fault
             parts = [
-                whiten(values[name][where.index], where, self._noise[name])
+                whiten(
+                    self._drifting[name].of(values[name])
+                    if name in self._drifting
+                    else values[name][where.index],
+                    where,
+                    self._noise[name],
+                )
                 for name, where in self._layouts.items()
             ]
         white = np.concatenate(parts)
@@ -133,6 +152,7 @@ def descend(
     x: Array,
     noise: dict[str, Autoregression],
     derivatives: Derivatives,
+    drifting: Mapping[str, Differences] = MappingProxyType({}),
 ) -> Array:
     """Return the vector of least squares, searched from ``x``.
 
@@ -140,12 +160,13 @@ def descend(
     ----------
     noise : by which each output is whitened
     derivatives : found before, or empty; they are kept up
+    drifting : outputs of which differences count
     """
     from scipy.optimize import least_squares
 
     if not len(x):
         return x
-    weighing = Weighing(space, layouts, noise)
+    weighing = Weighing(space, layouts, noise, drifting)
 
     def slope(v: Array) -> Array:
         return weighing.slope(derivatives.at(v, weighing))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from toolkit.diagnosis.fit.descent import Derivatives, Space, descend
 from toolkit.diagnosis.fit.noise import (
     Autoregression,
+    Differences,
     Layout,
     autocovariance,
     fit_noise,
@@ -167,7 +169,7 @@ def fit(
         plain, intervals = False, False
     if plain is None:
         alternative = _plain(space, layouts, solved, derivatives)
-        plain = alternative is not None and _absorbs(solved, alternative, layouts)
+        plain = alternative is not None and _absorbs(space, solved, alternative, layouts)
         solution = alternative if plain and alternative is not None else solved
     else:
         solution = _plain(space, layouts, solved, derivatives) or solved if plain else solved
@@ -226,32 +228,52 @@ def _plain(
 ) -> _Solved | None:
     """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise.
 
-    None as well where an output only drifts: its squares are the sum of all that pushed it before, and the
-    smallest sum says nothing of what each push was.
+    Of an output that only drifts they are those of its differences: its own squares are the sum of all that
+    pushed it before, and the smallest sum says nothing of what each push was.
     """
     coloured = any(autoregression.reflection for autoregression in from_.noise.values())
-    if not len(from_.x) or not coloured or space.problem.rates:
+    if not len(from_.x) or not coloured:
         return None
+    drifting = _drifting(space, layouts)
+    noise = from_.noise | _noise_of_differences(space, from_, drifting)
     weights = {
         name: Autoregression(
             reflection=(), sd=autoregression.marginal_sd * math.sqrt(autoregression.correlation_rows)
         )
-        for name, autoregression in from_.noise.items()
+        for name, autoregression in noise.items()
     }
-    return _solve(space, layouts, from_.x, weights, derivatives)
+    return _solve(space, layouts, from_.x, weights, derivatives, drifting)
 
 
-def _absorbs(coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
+def _drifting(space: Space, layouts: dict[str, Layout]) -> dict[str, Differences]:
+    return {name: Differences(layouts[name], rows) for name, rows in space.problem.rates.items()}
+
+
+def _noise_of_differences(
+    space: Space, solved: _Solved, drifting: dict[str, Differences]
+) -> dict[str, Autoregression]:
+    return {
+        name: fit_noise(each.of(solved.residual[name]), each.layout, floor=space.problem.floor[name])
+        for name, each in drifting.items()
+    }
+
+
+def _absorbs(space: Space, coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
     """Tell whether the coloured fit leaves a larger residual than noise alone can explain.
 
     Under the right model both estimate the same, and the plain one is smaller by what its parameters take.
     Where the coloured one is much larger, its noise has absorbed physics (a specification test in the
     manner of Hausman), and the plain one is to be trusted.
     """
+    drifting = _drifting(space, layouts)
+    noise = plain.noise | _noise_of_differences(space, plain, drifting)
     for name, where in layouts.items():
-        coloured_square = float(np.mean(coloured.residual[name][where.index] ** 2)) if where.n else 0.0
-        plain_square = float(np.mean(plain.residual[name][where.index] ** 2)) if where.n else 0.0
-        worth = plain.noise[name].correlation_rows / max(where.n, 1)
+        judged = [
+            drifting[name].of(each.residual[name]) if name in drifting else each.residual[name][where.index]
+            for each in (coloured, plain)
+        ]
+        coloured_square, plain_square = (float(np.mean(rows**2)) if len(rows) else 0.0 for rows in judged)
+        worth = noise[name].correlation_rows / max(len(judged[0]), 1)
         if coloured_square > plain_square * (
             1 + NOISE.absorbed + NOISE.absorbed_by_chance * len(plain.x) * worth
         ):
@@ -265,8 +287,9 @@ def _solve(
     x: Array,
     weights: dict[str, Autoregression],
     derivatives: Derivatives,
+    drifting: Mapping[str, Differences] = MappingProxyType({}),
 ) -> _Solved:
-    x = descend(space, layouts, x, weights, derivatives)
+    x = descend(space, layouts, x, weights, derivatives, drifting)
     simulated = space.simulated(x)
     residual = space.residual(simulated)
     noise = noise_of(space.problem, residual, layouts, used=len(x))
@@ -395,9 +418,23 @@ def _covariance(
         return np.zeros((0, 0))
     J = space.around(solved.x)[1]
     prior = space.problem.prior_rows(space.sizes, len(solved.x))
-    matrix = covariance(J, prior, space.sizes, layouts, solved.noise, plain=plain)
+
+    def of_plain(solution: _Solved) -> Array:
+        drifting = _drifting(space, layouts)
+        return covariance(
+            {name: drifting[name].of(rows) if name in drifting else rows for name, rows in J.items()},
+            prior,
+            space.sizes,
+            layouts | {name: each.layout for name, each in drifting.items()},
+            solution.noise | _noise_of_differences(space, solution, drifting),
+            plain=True,
+        )
+
+    if plain:
+        return of_plain(solved)
+    matrix = covariance(J, prior, space.sizes, layouts, solved.noise, plain=False)
     if alternative is not None:
-        unsure = np.diag(covariance(J, prior, space.sizes, layouts, alternative.noise, plain=True))
+        unsure = np.diag(of_plain(alternative))
         apart = ((alternative.x - solved.x) * space.sizes) ** 2
         expected = np.maximum(unsure - np.diag(matrix), 0.0)
         matrix = matrix + np.diag(np.where(apart > NOISE.apart**2 * expected, apart, 0.0))

@@ -6,6 +6,7 @@ every clean recording. Here a residual is judged by its innovations: what its ow
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -86,6 +87,28 @@ class Layout:
     def n(self) -> int:
         """Number of kept values."""
         return len(self.index)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Differences:
+    """Differences of an output's kept values over some ``rows``, within the segments of a layout."""
+
+    where: Layout
+    rows: int
+
+    @property
+    def layout(self) -> Layout:
+        """Where the differences themselves stand: all of them, one after the other."""
+        counts = [max(part.stop - part.start - self.rows, 0) for part in self.where.segments]
+        ends = np.cumsum([0, *counts]).tolist()
+        segments = tuple(slice(a, b) for a, b in itertools.pairwise(ends) if b > a)
+        return Layout(np.arange(ends[-1]), segments, self.where.runs)
+
+    def of(self, column: Array) -> Array:
+        """Return the differences of a column over all rows, (rows,) or (rows, k)."""
+        values = column[self.where.index]
+        parts = [values[part] for part in self.where.segments]
+        return np.concatenate([part[self.rows :] - part[: -self.rows] for part in parts])
 
 
 def layout(times: Sequence[Array], counted: Sequence[NDArray[np.bool_]], *, ordered: bool = True) -> Layout:

@@ -108,15 +108,16 @@ def shows_sensor(problem: Problem, fit: Fit, name: str) -> bool:
 
     Rows in no order of time, or driven anew at each of them, tell what was left out in their differences too.
     """
-    quick = _quick_sd(problem, fit.simulated[name], name)
+    quick = quick_sd(problem, fit.simulated[name], name)
     return problem.case.has_time and quick <= NOISE.largest * spread(problem, name)
 
 
 def _by_differences(problem: Problem, fit: Fit, name: str) -> float:
-    return _quick_sd(problem, fit.residual[name], name)
+    return quick_sd(problem, fit.residual[name], name)
 
 
-def _quick_sd(problem: Problem, column: Array, name: str) -> float:
+def quick_sd(problem: Problem, column: Array, name: str) -> float:
+    """Return the standard deviation that the quickest differences of an output's column (rows,) show."""
     where = problem.layout(name)
     values = column[where.index]
     if problem.case.has_order:

@@ -105,7 +105,7 @@ def _foretold(
     asked = [
         trial
         for trial in trials
-        if trial.form != "event" and (trial.acts == "enters" or trial.applied.channel == name)
+        if trial.form != "event" and (trial.acts == "enters" or name in trial.outputs)
     ]
 
     def laws() -> Iterator[tuple[Trial, Array]]:

@@ -22,6 +22,7 @@ from toolkit.diagnosis.law.terms import pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
     curve_trial,
+    scales_of,
     tells_runs_apart_alone,
     trials_of,
     unlocked_tone,
@@ -35,6 +36,7 @@ from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
+    from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.folds import HeldOut
     from toolkit.diagnosis.fit.problem import Problem
@@ -148,6 +150,7 @@ def _next(
         trial
         for trial in (
             *trials_of(problem, base, outputs),
+            *scales_of(problem, base),
             *terms_of(problem),
             *pulses_of(problem, base, screen),
         )
@@ -235,7 +238,6 @@ def _judged(
     looked: int,
 ) -> tuple[Law, Fit, HeldOut] | None:
     problem = search.problem
-    applied = refit.active[-1]
     if not _is_told_from_none(refit, search.screen.trust(refit.noise)):
         return None
     scores = held_out
@@ -251,18 +253,28 @@ def _judged(
             problem, held_out, scores, LAWS.share
         ):
             return None
-        name = str(applied.channel)
-        if search.folds.by_run and name in problem.names:
-            counting = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]
-            columns = (
-                held_out.simulated[name],
-                *(problem.observed[name] - each.simulated[name] for each in (held_out, scores)),
-            )
-            runs = [tuple(column[at] for column in columns) for at in counting if len(at)]
-            if tells_runs_apart_alone(trial, looked, runs):
-                return None
+        outputs = trial.outputs if search.folds.by_run else ()
+        if outputs and all(
+            tells_runs_apart_alone(trial, looked, _of_runs(problem, name, held_out, scores, trial))
+            for name in outputs
+        ):
+            return None
     law = _law(search, base, held_out, trial, refit, scores, p_value=p_value(trial, looked))
     return law, refit, scores
+
+
+def _of_runs(
+    problem: Problem, name: str, before: HeldOut, after: HeldOut, trial: Trial
+) -> list[tuple[Array, Array, Array]]:
+    """Return of every run what sizes of its own are in proportion to, and an output's errors."""
+    sizes = [before.simulated[name], *([trial.swayed[name]] if trial.swayed else ())]
+    errors = [problem.observed[name] - each.simulated[name] for each in (before, after)]
+    counting = [rows.start + np.flatnonzero(problem.kept[name][rows]) for rows in problem.slices]
+    return [
+        (np.column_stack([size[at] for size in sizes]), errors[0][at], errors[1][at])
+        for at in counting
+        if len(at)
+    ]
 
 
 def _law(

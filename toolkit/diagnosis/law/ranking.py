@@ -48,10 +48,12 @@ def all_responses(problem: Problem, base: Fit, trials: Sequence[Trial]) -> Itera
             yield _usable(problem, pushed.pop(i))
             continue
         columns = _evaluated(problem, base, trial)
+        if trial.swayed:
+            answered = {name: sway[:, None] * columns for name, sway in trial.swayed.items()}
+        else:
+            answered = {str(trial.applied.channel): columns}
         none = np.zeros_like(columns)
-        yield _usable(
-            problem, {name: columns if name == trial.applied.channel else none for name in problem.names}
-        )
+        yield _usable(problem, {name: answered.get(name, none) for name in problem.names})
 
 
 def _entry(trial: Trial) -> tuple[object, ...]:
@@ -220,13 +222,15 @@ def _unit(applied: AppliedEffect, name: str) -> AppliedEffect:
 
 
 def _evaluated(problem: Problem, base: Fit, trial: Trial) -> Array:
+    """Return what a law adds to its output, or the factor by which it scales a tire, for each amplitude."""
     applied, law = trial.applied, _formula(trial.applied)
-    output, names = str(applied.channel), amplitudes(applied)
+    names = amplitudes(applied)
     columns = np.zeros((problem.rows, len(names)))
     for run, rows in zip(problem.runs, problem.slices, strict=True):
         if not applied.acts_in(run):
             continue
-        simulated = base.simulated[output][rows]
+        # What scales a tire does not read an output.
+        simulated = 1.0 if trial.swayed else base.simulated[str(applied.channel)][rows]
         signals = {ITSELF: simulated, "time": run.t}
         signals |= {name: run.columns[name] for name in law.signals if name in run.columns}
         for k, name in enumerate(names):

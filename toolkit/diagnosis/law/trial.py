@@ -15,7 +15,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from toolkit.diagnosis.law.shapes import (
 from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.unexplained import (
+    Line,
     beyond_its_past,
     narrowest_line,
     strongest_events,
@@ -44,7 +45,8 @@ from toolkit.diagnosis.search.unexplained import (
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import is_speed
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.law import ITSELF, Acts, conversion, formula, law_effect, law_name
+from toolkit.effects.law import ITSELF, SCALED, TIME, Acts, conversion, formula, law_effect, law_name
+from toolkit.errors import FitError
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -87,8 +89,9 @@ class Signal:
 class Trial:
     """One law at one place from one start, with its linearised gain of twice the log-likelihood.
 
-    ``unit`` is that of what it adds, or of its factor. ``looked`` counts the laws that were looked at to find
-    it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
+    ``unit`` is that of what it adds, or of its factor. ``swayed`` is, of a law that scales what drives a
+    tire, how every output answers to its factor, (rows,). ``looked`` counts the laws that were looked at to
+    find it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
     """
 
     shape: Shape
@@ -99,6 +102,13 @@ class Trial:
     gain: float = 0.0
     looked: int = 1
     sds: Mapping[str, float] = field(default_factory=dict)
+    swayed: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Outputs that it acts on; none of one in an equation, which moves whatever answers."""
+        channel = () if self.acts == "enters" else (str(self.applied.channel),)
+        return tuple(self.swayed) or channel
 
     @property
     def form(self) -> Form:
@@ -122,7 +132,13 @@ def amplitudes(applied: AppliedEffect) -> tuple[str, ...]:
 
 
 def started(
-    problem: Problem, shape: Shape, signals: tuple[Signal, ...], acts: Acts, channel: str, *, force: str = ""
+    problem: Problem,
+    shape: Shape,
+    signals: tuple[Signal, ...],
+    acts: Acts,
+    channel: str | None,
+    *,
+    force: str = "",
 ) -> Iterator[Trial]:
     """Give a law at every start of what shapes it; ``force`` is the unit of what enters an equation."""
     t = np.concatenate([run.t for run in problem.runs]) if problem.case.has_time else np.arange(2.0)
@@ -131,7 +147,7 @@ def started(
 
 
 def trial_at(
-    problem: Problem, shape: Shape, signals: tuple[Signal, ...], acts: Acts, channel: str,
+    problem: Problem, shape: Shape, signals: tuple[Signal, ...], acts: Acts, channel: str | None,
     start: Mapping[str, float], *, force: str = "",
 ) -> Trial:  # fmt: skip
     """Return a law at one start, the amplitudes zero; ``force`` is the unit of what enters an equation."""
@@ -139,11 +155,12 @@ def trial_at(
     tokens = dict(zip(("x", "z"), (signal.written_in(shape) for signal in signals), strict=False))
     text = shape.text.format(**tokens) if "{x}" in shape.text else shape.text
     effect = law_effect(law_name(acts, text))
-    y = {"adds": channel_unit(case, problem.model, channel), "multiplies": "1", "enters": force}[acts]
+    itself = None if channel is None else channel_unit(case, problem.model, channel)
+    y = {"adds": itself or "1", "enters": force}.get(acts, "1")
     plain = {"y": y} | {key: signal.unit for key, signal in zip(("x", "z"), signals, strict=False)}
     values: dict[str, float] = {name: start.get(name, 0.0) for name in effect.names}
-    if acts != "enters":
-        values |= conversion(ITSELF, unit(channel_unit(case, problem.model, channel)).factor, 0.0)
+    if acts != "enters" and itself is not None:
+        values |= conversion(ITSELF, unit(itself).factor, 0.0)
     for signal in signals if acts != "enters" else ():
         if any(driver.name in signal.written for driver in case.drivers):
             name = signal.written[signal.written.index("[") + 1 : signal.written.index("]")]
@@ -246,9 +263,29 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
         line = strongest_line(problem, output, base.residual[output])
         if line is not None:
             yield trial_at(problem, TONE, signals[-1:], "adds", output, {"frequency": line.frequency})
+            yield from _locked(problem, base, output, line, signals[-1])
             for signal, start in itertools.product(signals[:-1], rung(line.frequency)):
                 yield trial_at(problem, MODE, (signal,), "adds", output, start)
         yield from _events(problem, base, output)
+
+
+def _locked(problem: Problem, base: Fit, output: str, line: Line, time: Signal) -> Iterator[Trial]:
+    """Give the tone near a line whose phase goes on through all runs, where their times are near enough.
+
+    Over a whole session a tone is narrower than in one run, by as much as the session is longer: between the
+    hills on which its phase fits two neighbouring runs and no third one, no descent finds the highest.
+    """
+    good = [problem.kept[output][rows] for rows in problem.slices]
+    t = np.concatenate([run.t[kept] for run, kept in zip(problem.runs, good, strict=True)])
+    count = math.ceil(2 * line.width * LAWS.locked * max(float(np.ptp(t)), 1 / line.width))
+    if len(problem.runs) < 2 or count > LAWS.locked_most:
+        return
+    values = base.residual[output][problem.kept[output]]
+    near = line.frequency + line.width * np.linspace(-1, 1, count)
+    turns = 2 * math.pi * (t - t.mean())
+    waves = [abs(complex(np.exp(-1j * frequency * turns) @ values)) for frequency in near.tolist()]
+    frequency = float(near[int(np.argmax(waves))])
+    yield replace(trial_at(problem, TONE, (time,), "adds", output, {"frequency": frequency}), looked=count)
 
 
 def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
@@ -325,8 +362,36 @@ def curve_trial(problem: Problem, trial: Trial) -> Trial | None:
     if len(shape.units) < 3:
         return None
     force = trial.unit if trial.acts == "enters" else ""
-    channel = str(trial.applied.channel)
-    return trial_at(problem, shape, trial.signals, trial.acts, channel, {}, force=force)
+    drawn = trial_at(problem, shape, trial.signals, trial.acts, trial.applied.channel, {}, force=force)
+    return replace(drawn, swayed=trial.swayed)
+
+
+def scales_of(problem: Problem, base: Fit) -> Iterator[Trial]:
+    """Give every law of what drives a tire, its friction or its stiffness, at every start, without gains.
+
+    Such a law is one of all forces and moments at once: a road that grips less has another force and another
+    trail, as the similarity of tires has it, and no factor of one output is both. Over the slip angle itself
+    it would be another curve, not another grip.
+    """
+    signals = [
+        signal
+        for signal in signals_of(problem, base, problem.names[0])
+        if ((signal.steady and ITSELF not in signal.written) or signal.name == TIME)
+        and signal.name not in ("SA", "SA_CMD")
+    ]
+    for acts in SCALED if signals else ():
+        uniform = law_effect(law_name(cast("Acts", acts), "a"))
+        if not problem.model.places(uniform):
+            continue
+        step = AppliedEffect(effect=uniform, values={"a": LAWS.step})
+        try:
+            stepped = problem.simulate(base.p, (*base.active, step))
+        except FitError:
+            continue
+        swayed = {name: (stepped[name] - base.simulated[name]) / LAWS.step for name in problem.names}
+        for signal, shape in itertools.product(signals, ONE):
+            for trial in started(problem, shape, (signal,), cast("Acts", acts), None):
+                yield replace(trial, swayed=swayed)
 
 
 def _events(problem: Problem, base: Fit, output: str) -> Iterator[Trial]:
@@ -346,7 +411,8 @@ def tells_runs_apart_alone(trial: Trial, looked: int, runs: Sequence[tuple[Array
     Parameters
     ----------
     looked : laws that were looked at
-    runs : of every run the simulated output, and its held-out errors without and with the law
+    runs : of every run what a run's own size would be in proportion to, (n,) or (n, k), and the held-out
+        errors of an output without and with the law
     """
     from scipy.stats import chi2
 

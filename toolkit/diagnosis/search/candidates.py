@@ -9,6 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from toolkit.diagnosis.fit.sensor_noise import quick_sd
 from toolkit.diagnosis.policy import STARTS
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.effects.applied import ORIGIN, SOURCE_ORIGIN, AppliedEffect, EffectKey
@@ -148,6 +151,8 @@ def candidates(
             continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
+            if _is_refuted(problem, effect, channel):
+                continue
             on_inputs = effect.on_channel is not None and "input" in effect.on_channel.where
             of_many = effect.discrete and effect.parameters and channel not in problem.model.capability.cells
             if on_inputs and channel in inputs and of_many:
@@ -172,6 +177,22 @@ def candidates(
         else candidate
         for candidate in listed
     )
+
+
+def _is_refuted(problem: Problem, effect: Effect, channel: str | None) -> bool:
+    """Tell whether an output was recorded where an effect of it cannot show it, by more than its noise.
+
+    However well such an effect imitates something else: by rates alone, of which an angle that begins below
+    zero and was not folded has others than one that was, nothing of it would be seen.
+    """
+    image = None if effect.on_channel is None else effect.on_channel.image
+    if image is None or channel is None or channel not in problem.observed:
+        return False
+    values = problem.observed[channel][problem.kept[channel]]
+    noise = quick_sd(problem, problem.observed[channel], channel)
+    margin = max(STARTS.beyond_sd * noise, STARTS.beyond * float(np.abs(values).max(initial=0.0)))
+    beyond = (values < image[0] - margin) | (values > image[1] + margin)
+    return bool(np.count_nonzero(beyond) > STARTS.beyond * len(values))
 
 
 def _starts(case: Surroundings, effect: Effect) -> tuple[Start, ...]:

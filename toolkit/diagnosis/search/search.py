@@ -154,7 +154,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     problem = without_outliers(problem, refitted.residual)
     refitted = fit(problem, start=refitted.p)
     problem = judged_by_rates(problem, refitted)
-    if problem.rates and refitted.plain:
+    if problem.rates:
         refitted = fit(problem, start=refitted.p)
     folds = folds_of(problem, refitted)
     wrong = wrong_units(problem, (nominal, refitted))

@@ -31,7 +31,12 @@ EFFECT = Effect(
     parameters=(),
     channel=_folded,
     on_channel=ChannelFacts(
-        where=("output", "cell", "program_load"), tare="own", by_value=False, about_zero=True, directed=True
+        where=("output", "cell", "program_load"),
+        tare="own",
+        by_value=False,
+        about_zero=True,
+        directed=True,
+        image=(0.0, float("inf")),
     ),
     discrete=True,
     reshapes=True,

@@ -188,7 +188,7 @@ def law_curve(law: DiagnosedLaw) -> bytes | None:
         axes.set_xlabel(law.variables[0])
         label = "factor less one" if law.acts == "multiplies" else f"added [{curve.unit}]"
         axes.set_ylabel(
-            f"{place.channel}: {label}" if place.kind == "output" else f"added to d{place.channel}/dt"
+            f"added to d{place.channel}/dt" if place.kind == "state" else f"{place.channel}: {label}"
         )
         axes.legend(frameon=False)
 
