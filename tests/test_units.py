@@ -139,6 +139,31 @@ def test_unknown_unit_is_an_error_that_says_where(text: str) -> None:
     assert caught.value.exit_code == 2
 
 
+@pytest.mark.parametrize(
+    "text", ["-N", "-1*lbf", "-mV/V", "0*N", "N*0", "N/1e400", "1e400 N", "inf N", "nan N", "nan", "-%"]
+)
+def test_a_unit_turns_no_sign_and_makes_nothing_of_no_value(text: str) -> None:
+    with pytest.raises(UnitError, match="unknown unit"):
+        unit(text)
+
+
+@pytest.mark.parametrize("text", ["2", "60", "0", "1e3", "0.5", "(2)", "1/2", "2*3"])
+def test_a_bare_number_is_no_unit(text: str) -> None:
+    # "SA (2)" is the second column of its name, and "FY=60" is a number without a unit.
+    with pytest.raises(UnitError, match="unknown unit"):
+        unit(text)
+
+
+@pytest.mark.parametrize("text", ["2 degC", "degF*2", "2*degC"])
+def test_a_scale_with_a_zero_has_no_multiples(text: str) -> None:
+    with pytest.raises(UnitError, match="unknown unit"):
+        unit(text)
+
+
+def test_a_multiple_of_a_unit_is_one() -> None:
+    assert (unit("1000 N").factor, unit("2 K").factor, unit("10 mm/s").factor) == (1000.0, 2.0, 0.01)
+
+
 def test_an_offset_unit_has_no_plain_scale() -> None:
     with pytest.raises(UnitError):
         si_scale("degC")

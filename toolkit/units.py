@@ -115,6 +115,7 @@ _NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]|\d\s*\)?\s*(\*\*|\^)|.{41}"
 _SCALE = re.compile(
     r"(?<!\w)(?:°|deg(?:ree)?s?_?)?([CF])(?:elsius|ahrenheit)\b|(?<!\w)(?:°|deg(?:ree)?_?)([CF])\b", re.I
 )
+_DIGITS, _NAME = re.compile(r"\d+\.?\d*(?:[eE][+-]?\d+)?"), re.compile(r"[^\W\d_]|°")
 _SPACED_SCALE = re.compile(r"\bdeg(?:ree)?s?\s+[CF]\b", re.I)
 
 
@@ -254,18 +255,22 @@ def _parse(text: str) -> Unit:
         raise _UnknownUnitError(text)
     ureg = registry()
     expression = _SPELLINGS.get(text) or _in_words(_HYPHEN.sub("*", text), _WORDS)
-    if not _SCALE.fullmatch(expression.strip("() ")):
+    # A bare number is none: "SA (2)" is a second column, "60" a value without its unit.
+    if not _NAME.search(_DIGITS.sub("", expression)):
+        raise _UnknownUnitError(text)
+    is_scale = _SCALE.fullmatch(expression.strip("() ")) is not None
+    of_scale = not is_scale and _SCALE.search(expression) is not None
+    if not is_scale:
         # With a space between them pint would multiply an angle by a charge.
         if _SPACED_SCALE.search(expression):
             raise _UnknownUnitError(text)
         expression = _SCALE.sub(lambda m: f"delta_deg{(m[1] or m[2]).upper()}", expression)
     try:
-        read: Any = ureg.parse_expression(expression)
-        number: Any = read if hasattr(read, "units") else ureg.Quantity(float(read), "dimensionless")
+        number = _quantity(expression, of_scale=of_scale)
         if dict(number.dimensionality) == {"[temperature]": 1}:
             zero = float(ureg.Quantity(0.0, number.units).to("kelvin").magnitude)
             factor = float(ureg.Quantity(1.0, number.units).to("kelvin").magnitude) - zero
-            return Unit(name, factor, zero, "K", "temperature")
+            return Unit(name, factor * float(number.magnitude), zero, "K", "temperature")
         if not number.dimensionality:
             # pint counts an angle as a pure number; only a named angle becomes one here.
             is_angle = any(part in _ANGLES for part in number._units)
@@ -279,6 +284,15 @@ def _parse(text: str) -> Unit:
         return Unit(name, float(base.magnitude), 0.0, symbol, dimension)
     except Exception as error:  # pint raises many kinds for text that is no unit
         raise _UnknownUnitError(text) from error
+
+
+def _quantity(expression: str, *, of_scale: bool) -> Any:
+    number: Any = registry().Quantity(registry().parse_expression(expression))
+    # -N would turn a sign, 0*N make every value zero, and 2 degC is no temperature: its zero is no multiple.
+    is_positive = 0 < number.magnitude < math.inf
+    if not is_positive or (of_scale and dict(number.dimensionality) == {"[temperature]": 1}):
+        raise _UnknownUnitError(expression)
+    return number
 
 
 def _kind(parts: dict[str, float]) -> str:

@@ -18,7 +18,7 @@ from tests.audit.audit_factory import (
     record,
     seven_digits,
 )
-from toolkit.audit.candidates import group_of
+from toolkit.audit.candidates import group_of, shared
 from toolkit.audit.identify import identify_columns, recompute, repair
 from toolkit.audit.model import columns_of
 from toolkit.examples import packaged_fig4_4
@@ -134,6 +134,30 @@ def test_what_all_candidates_of_an_ambiguous_file_share_is_told():
     found = judged(columns((*FY[:2], -FY[2], FY[3]), decimals=1), (R2, near))
     assert (found.grade, found.record, found.candidates) == ("ambiguous", None, ("m15-r2", "m15-r5"))
     assert found.variant == found.segments[0].variant == "E5 negative in FY"
+
+
+def test_what_ambiguous_candidates_share_is_told_where_another_sign_is_open():
+    x = columns().x.copy()
+    x[:, 1] = 0.0  # D52 is dead: of its sign nothing is known, of that of E5 everything
+    y = {load: seven_digits(x @ np.array([*c[:2], -c[2]]) + c[3]) for load, c in (("FY", FY), ("MZ", MZ))}
+    found = judged(from_arrays(x, y), (R2,))
+    assert (found.grade, found.candidates) == ("ambiguous", ("m15-r2",))
+    assert found.variant == found.segments[0].variant == "E5 negative in FY, MZ"
+
+
+@pytest.mark.parametrize(
+    ("variants", "common"),
+    [
+        (("E5 negative in FY, MZ", "D52 positive in FY; E5 negative in FY, MZ"), "E5 negative in FY, MZ"),
+        (("E5 negative in FY, MZ", "E5 negative in MZ; D51<->D52"), "E5 negative in MZ"),
+        (("E5 negative in FY; D51<->D52", "E5 positive in FY; D51<->D52"), "D51<->D52"),
+        (("E5 negative in FY", "D52 negative in FY"), None),
+        (("E5 negative in FY", None), None),
+        ((None,), None),
+    ],
+)
+def test_what_variants_share(variants, common):
+    assert shared(variants) == shared(variants[::-1]) == common
 
 
 def test_a_dead_channel_leaves_its_sign_open():

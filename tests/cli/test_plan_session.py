@@ -194,6 +194,7 @@ def test_a_cell_of_one_load_is_planned_too(home: Path, tmp_path: Path, model: st
         (("m15-virtual", "--u", "FX=1 N"), "plan-demand"),
         (("m15-virtual", "--u", "FY"), "plan-demand"),
         (("m15-virtual", "--u", "FY=-1 N"), "plan-demand"),
+        (("m15-virtual", "--u", "FY=60"), "plan-demand"),
         (("m15-virtual", "--u", "FY=1e999 N"), "plan-demand"),
         (("m15-virtual", "--u", "FY=1 N", "--u", "FY=2 N"), "plan-demand"),
         (("m15-virtual", "--u", "FY=1 kg"), None),

@@ -301,6 +301,8 @@ def test_only_the_members_asked_for_are_inflated():
 
 
 def test_kinds():
+    assert sniff(b"MZ [N*m],FY [N],SA [deg]\n1,2,3\n").id == "text"
+    assert sniff(b"MZ\x90\x00\x03\x00").id == "program"
     assert sniff(b"\xef\xbb\xbfFZ load,Fy").id == "text"
     assert sniff(b'{"a": 1}').id == "json"
     assert office_kind(frozenset(("mimetype", "content.xml")), b"").id == "odf"

@@ -44,7 +44,11 @@ class Answer:
 
     status: int
     headers: dict[str, str]
-    body: str
+    content: bytes
+
+    @property
+    def body(self) -> str:
+        return self.content.decode()
 
     def data(self, **attributes: str) -> list[str]:
         """Return the ``value`` of each <data> inside the first element with these attributes."""
@@ -111,8 +115,7 @@ class Served:
                 connection.putheader("Content-Length", str(len(content)))
             connection.endheaders(content)
             response = connection.getresponse()
-            text = response.read().decode()
-            return Answer(response.status, {k.lower(): v for k, v in response.getheaders()}, text)
+            return Answer(response.status, {k.lower(): v for k, v in response.getheaders()}, response.read())
 
     def page(self, path: str, **headers: str | None) -> Answer:
         """Ask for a page below the place."""

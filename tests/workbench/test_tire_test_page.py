@@ -137,6 +137,11 @@ def test_what_is_shown_is_downloaded_and_the_reduced_test_whole(
     )
     conicity = next(row for row in everything if row["name"] == "conicity")
     assert float(conicity["value"]) == answer["characteristics"]["pull"][0]["conicity"]["value"]
+    reduced = tested.page(f"/test/{ONE}/download/test.xlsx")
+    assert reduced.status == 200
+    (tmp_path / "test.xlsx").write_bytes(reduced.content)
+    read_back = command(capsys, "process", tmp_path / "test.xlsx", "--home", tested.home)
+    assert read_back["conditions"] == answer["conditions"]
     assert tested.page(f"/test/{ONE}/download/../../etc/passwd").status == 404
     assert tested.page(f"/test/{ONE}/download/notes.txt").status == 404
 

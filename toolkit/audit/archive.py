@@ -16,7 +16,7 @@ from typing import Any
 
 from toolkit.audit.archive_findings import Across, Lines, unread_folder
 from toolkit.audit.cluster import run_on_cluster
-from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, DisagreeingSides, Grade
+from toolkit.audit.model import CLEAN, GRADES, NOT_IDENTIFIED, TELLS, DisagreeingSides, Grade, in_words
 from toolkit.audit.one_file import Auditor, unreadable
 from toolkit.audit.other_files import by_other_files
 from toolkit.audit.resume import Done, Files, Results, done
@@ -132,12 +132,8 @@ def sentence(line: Mapping[str, Any]) -> str:
     if line["sides"] is not None and line["sides"]["side"] != "forces":
         return statement(DisagreeingSides(**line["sides"]), line["variant"])
     grade: Grade = line["grade"]
-    who = ""
-    if line["record"]:
-        who = f" ({line['record']}{', ' + line['variant'] if line['variant'] else ''})"
-    elif line["candidates"]:
-        who = f" ({', '.join(line['candidates'])})"
-    return f"Fy and Mz were computed {TELLS[grade]}{who}"
+    who = in_words(line["record"], line["candidates"], line["variant"])
+    return f"Fy and Mz were computed {TELLS[grade]}{f' ({who})' if who else ''}"
 
 
 def _lines(sums: Sums, key: str) -> Iterator[bytes]:

@@ -8,7 +8,7 @@ forms of the same candidate.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -244,6 +244,27 @@ def describe(
     return "; ".join(parts) or None
 
 
+def shared(variants: Sequence[str | None]) -> str | None:
+    """Return what each of these variants tells, in the words of `describe`; None where that is nothing.
+
+    >>> shared(["E5 negative in FY, MZ", f"E5 negative in FY, MZ; {CONSTANT} positive in FY"])
+    'E5 negative in FY, MZ'
+    """
+    told = [_statements(variant) for variant in variants]
+    common = [
+        (change, [load for load in loads if all(load in other.get(change, ()) for other in told)])
+        for change, loads in told[0].items()
+    ]
+    parts = [f"{change} in {', '.join(loads)}" if any(loads) else change for change, loads in common if loads]
+    return "; ".join(parts) or None
+
+
+def _statements(variant: str | None) -> dict[str, list[str]]:
+    """Return the loads of each change of sign in a variant; of exchanged columns one without a name."""
+    parts = (part.rpartition(" in ") for part in (variant or "").split("; ") if part)
+    return {change or loads: loads.split(", ") if change else [""] for change, _, loads in parts}
+
+
 def by_columns(variant: str, loads: tuple[str, ...]) -> bool:
     """Tell whether a variant is also what a turned or an exchanged cell column would look like.
 
@@ -255,10 +276,9 @@ def by_columns(variant: str, loads: tuple[str, ...]) -> bool:
     (False, False)
     """
     turned: dict[str, set[str]] = {}
-    for part in variant.split("; "):
-        name, sign, named = part.rpartition(" in ")
-        if sign:
-            turned.setdefault(name.rpartition(" ")[0], set()).update(named.split(", "))
+    for change, named in _statements(variant).items():
+        if any(named):
+            turned.setdefault(change.rpartition(" ")[0], set()).update(named)
     return CONSTANT not in turned and all(named == {*loads} for named in turned.values())
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.arrays import Array
-from toolkit.audit.candidates import Group, cannot_correct, describe, group_of
+from toolkit.audit.candidates import Group, cannot_correct, describe, group_of, shared
 from toolkit.audit.model import Columns, Grade, Identification, Repair, Segment, SkippedRecord, worst
 from toolkit.audit.runs import Hit, Partition, Reach, Runs, products, reach_of, without_chance
 from toolkit.audit.screen import Key, Screen, probe_rows, screen_of
@@ -269,14 +269,13 @@ class _Judge:
         segments, single = [], []
         for start, stop, answer in parts:
             only = answer[0] if len(answer) == 1 else None
-            # What all candidates of an ambiguous file share is known of it.
-            variants = {a.variant for a in answer}
             segments.append(
                 Segment(
                     first_row=start + 1,
                     last_row=stop,
                     record=only.record if only else None,
-                    variant=variants.pop() if len(variants) == 1 else None,
+                    # What all candidates of an ambiguous file share is known of it.
+                    variant=shared([candidate.variant for candidate in answer]) if answer else None,
                     grade=self._grade(only) if only else "ambiguous" if answer else "unknown",
                     candidates=tuple(sorted({a.record for a in answer})) if len(answer) > 1 else (),
                 )

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from toolkit.audit.context import Context, context_of
 from toolkit.audit.identify import identify_columns, recompute
-from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, Which, columns_of
+from toolkit.audit.model import CLEAN, TELLS, Columns, Identification, Which, columns_of, in_words
 from toolkit.audit.screen import Screen, Signature, layout, screen_of
 from toolkit.audit.sides import statement
 from toolkit.audit.weigh import impossible, inclinations, steps, weighed
@@ -371,12 +371,8 @@ def _findings(
     if choice.trouble is not None:
         findings.append(Finding(rule="registry-damaged", where=where, message=choice.trouble))
     if identification is not None and identification.grade not in CLEAN:
-        who = (
-            f" ({identification.record}{', ' + identification.variant if identification.variant else ''})"
-            if identification.record
-            else ""
-        )
-        text = f"Fy and Mz were computed {TELLS[identification.grade]}{who}"
+        who = in_words(identification.record, identification.candidates, identification.variant)
+        text = f"Fy and Mz were computed {TELLS[identification.grade]}{f' ({who})' if who else ''}"
         if identification.sides is not None and identification.sides.side != "forces":
             text = statement(identification.sides, identification.variant)
         findings.append(Finding(rule=f"identified-{identification.grade}", where=where, message=text))

@@ -4,6 +4,7 @@ MZ.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, get_args
 
@@ -111,6 +112,11 @@ def columns_of(recording: Recording) -> Columns:
     )
 
 
+def in_words(record: str | None, candidates: Sequence[str], variant: str | None) -> str:
+    """Return the record, or those of which one may have computed a file, and how all of them were changed."""
+    return ", ".join(filter(None, (record or " or ".join(candidates), variant)))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
     """Rows that one record computed."""
@@ -118,7 +124,10 @@ class Segment:
     first_row: Annotated[int, Entry("from 1 at the first row of data")]
     last_row: int
     record: Annotated[str | None, Entry("null where it is unknown or ambiguous")]
-    variant: Annotated[str | None, Entry("how the record was changed: E5 negative in FY, MZ")]
+    variant: Annotated[
+        str | None,
+        Entry("how the record was changed: E5 negative in FY, MZ; what all candidates share"),
+    ]
     grade: Grade
     candidates: Annotated[tuple[str, ...], Entry("of an ambiguous segment")] = ()
 

@@ -138,7 +138,10 @@ class ArchivedFile:
     rows: int | None = None
     grade: Grade
     record: str | None = None
-    variant: Annotated[str | None, Entry("how the record was changed: E5 negative in FY, MZ")] = None
+    variant: Annotated[
+        str | None,
+        Entry("how the record was changed: E5 negative in FY, MZ; what all candidates share"),
+    ] = None
     issued: Annotated[bool | None, Entry("whether the coefficients were those of the certificate")] = None
     candidates: Annotated[tuple[str, ...], Entry("of an ambiguous file")] = ()
     segments: tuple[Segment, ...] = ()

@@ -30,7 +30,6 @@ _MAGIC = (
     (b"BZh", Kind("bzip2", "a bzip2 archive")),
     (b"\xfd7zXZ", Kind("xz", "an xz archive")),
     (b"\x7fELF", Kind("program", "a program")),
-    (b"MZ", Kind("program", "a Windows program")),
     (b"TDSm", Kind("tdms", "a LabVIEW TDMS file")),
     (b"MDF     ", Kind("mdf", "an MDF measurement file")),
     (b"UnFinMF ", Kind("mdf", "an MDF measurement file")),
@@ -54,8 +53,8 @@ def sniff(data: bytes) -> Kind:
     'a PDF document'
     >>> sniff(b"").id
     'empty'
-    >>> sniff("FZ load,Fy".encode()).id
-    'text'
+    >>> sniff("FZ load,Fy".encode()).id, sniff(b"MZ [N*m],FY [N]").id, sniff(b"MZ\\x90\\x00\\x03\\x00").id
+    ('text', 'text', 'program')
     """
     if not data:
         return Kind("empty", "an empty file")
@@ -66,7 +65,9 @@ def sniff(data: bytes) -> Kind:
         return Kind("utf-16", "text in UTF-16")
     head = data[:_HEAD]
     if b"\x00" in head:
-        return Kind("binary", "binary data")
+        # Two letters are no magic by themselves: a table whose first column is MZ begins with them as well.
+        is_program = data.startswith(b"MZ")
+        return Kind("program", "a Windows program") if is_program else Kind("binary", "binary data")
     start = head.removeprefix(_BOM).lstrip()[:64].lower()
     if not start:
         return Kind("blank", "a file of blanks only")

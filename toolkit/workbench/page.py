@@ -103,6 +103,12 @@ def page(request: Request, name: str, *, status: int = 200, **context: object) -
     return HTMLResponse(fragment(request, name, **context), status, {"content-language": _language(request)})
 
 
+def as_file(content: str | bytes, media_type: str, name: str, *, shown: bool = False) -> Response:
+    """Return a file by its name, to be kept or, ``shown``, to stand in a page."""
+    disposition = f'{"inline" if shown else "attachment"}; filename="{name}"'
+    return Response(content, media_type=media_type, headers={"content-disposition": disposition})
+
+
 def fragment(request: Request, name: str, **context: object) -> Markup:
     """Return the text of a page or of a part, to stand in another."""
     bench = request.app.state.bench

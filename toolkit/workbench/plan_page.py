@@ -15,7 +15,7 @@ from toolkit.lab.desk.jobs import start_job
 from toolkit.lab.desk.kept_plans import KINDS, PlanKind, fixtures_of, plan_words, read_plan, titles_of
 from toolkit.lab.desk.previews import templates_of
 from toolkit.workbench.bench import Bench, holding
-from toolkit.workbench.page import Routes, page
+from toolkit.workbench.page import Routes, as_file, page
 
 _TYPES = {
     "pdf": "application/pdf", "png": "image/png", "json": "application/json",
@@ -59,11 +59,8 @@ def file(request: Request) -> Response:
     planned, name = read_plan(folder), request.path_params["name"]
     if name not in (*planned.files, *planned.pictures):
         raise HTTPException(404)
-    disposition = "inline" if name in planned.pictures else "attachment"
-    return Response(
-        read_regular(folder / name, RESULT_FILE), media_type=_TYPES[name.rpartition(".")[2]],
-        headers={"content-disposition": f'{disposition}; filename="{name}"'},
-    )  # fmt: skip
+    content = read_regular(folder / name, RESULT_FILE)
+    return as_file(content, _TYPES[name.rpartition(".")[2]], name, shown=name in planned.pictures)
 
 
 def start(request: Request) -> Response:

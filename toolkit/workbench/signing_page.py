@@ -14,7 +14,7 @@ from toolkit.calibration.registry.registry import ID
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.lab.desk.pending import Pending, add_answer, drop_request, pending_request, sign_by_agent
 from toolkit.workbench.bench import Bench, waiting
-from toolkit.workbench.page import Routes
+from toolkit.workbench.page import Routes, as_file
 from toolkit.workbench.record_page import record_page
 from toolkit.workbench.session_page import session_page
 
@@ -22,10 +22,7 @@ from toolkit.workbench.session_page import session_page
 def request_file(request: Request) -> Response:
     """Return the file of a request, as `--request` writes it."""
     _, pending = _waiting(request)
-    return Response(
-        pending.request.text, media_type="application/json",
-        headers={"content-disposition": f'attachment; filename="{pending.id}.request.json"'},
-    )  # fmt: skip
+    return as_file(pending.request.text, "application/json", f"{pending.id}.request.json")
 
 
 def answered(request: Request) -> Response:

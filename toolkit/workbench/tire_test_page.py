@@ -19,7 +19,7 @@ from toolkit.lab.desk.holdings import Reported, rows_of_tests
 from toolkit.lab.desk.seen_test import recordings_answer, results_answer, shown_conditions
 from toolkit.lab.tire_tests.resolve import Resolved
 from toolkit.workbench.bench import Bench, holding
-from toolkit.workbench.page import Routes, page
+from toolkit.workbench.page import Routes, as_file, page
 
 WINDOW = 100
 """Rows of a list that are asked for at once."""
@@ -198,11 +198,8 @@ def _resolve(bench: Bench, folder: Path, record: str | None) -> Resolved:
 def _reduced(resolved: Resolved) -> Response:
     from toolkit.testfile.write import workbook
 
-    return Response(
-        workbook(resolved.result, dict(resolved.recordings)),
-        media_type="application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
-        headers={"content-disposition": 'attachment; filename="test.xlsx"'},
-    )
+    content, _ = workbook(resolved.result, dict(resolved.recordings))
+    return as_file(content, "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet", "test.xlsx")
 
 
 def _table(rows: list[dict[str, Any]], name: str) -> Response:
@@ -214,10 +211,7 @@ def _table(rows: list[dict[str, Any]], name: str) -> Response:
         writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    return Response(
-        stream.getvalue(), media_type="text/csv; charset=utf-8",
-        headers={"content-disposition": f'attachment; filename="{name}"'},
-    )  # fmt: skip
+    return as_file(stream.getvalue(), "text/csv; charset=utf-8", name)
 
 
 def _content(folder: Path) -> str:

@@ -199,7 +199,8 @@ def _cause_of(file: Mapping[str, Any]) -> str:
     if file["grade"] == "stale":
         return f"computed by {file['record']}, which was not in force"
     if file["grade"] == "ambiguous":
-        return "one of several records"
+        first, *others = file["candidates"]
+        return "one of several records" if others else f"{first} with signs that the files leave open"
     return "no record explains them"
 
 

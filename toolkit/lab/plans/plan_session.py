@@ -52,7 +52,7 @@ FILES = (
     "plan.docx",
     "plan.pdf",
 )
-_QUANTITY = r"([-+0-9.eE]+)\s*(\S+)"
+_QUANTITY = r"([-+0-9.eE]++)\s*(\S+)"
 _DEMAND = re.compile(rf"\s*(\w+)\s*=\s*{_QUANTITY}\s*(?:\s+at\s+{_QUANTITY}\s*)?")
 
 

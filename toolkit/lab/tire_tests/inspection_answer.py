@@ -267,20 +267,14 @@ def _calibration_lines(inspection: Inspection) -> list[str]:
     import textwrap
 
     from toolkit.audit.inspection import withdrawal, wrong_signs
-    from toolkit.audit.model import TELLS
+    from toolkit.audit.model import TELLS, in_words
     from toolkit.audit.sides import WOULD_DECIDE
 
     identified = inspection.identification
     if identified is None:
         why = "no registry" if inspection.choice is None else "the file has no own Fy and Mz"
         return [f"  calibration not identified: {why}"]
-    record = (
-        f"{identified.record}{', ' + identified.variant if identified.variant else ''}"
-        if identified.record
-        else "-"
-    )
-    if identified.candidates:
-        record = " or ".join(identified.candidates)
+    record = in_words(identified.record, identified.candidates, identified.variant) or "-"
     withdrawn, signs = withdrawal(inspection), wrong_signs(inspection)
     how = TELLS[identified.grade]
     side = None if identified.sides is None else identified.sides.side
@@ -304,8 +298,8 @@ def _calibration_lines(inspection: Inspection) -> list[str]:
         )
     if len(identified.segments) > 1:
         lines += [
-            f"    rows {s.first_row}-{s.last_row}: {s.record or '-'}"
-            f"{', ' + s.variant if s.variant else ''} ({s.grade})"
+            f"    rows {s.first_row}-{s.last_row}: "
+            f"{in_words(s.record, s.candidates, s.variant) or '-'} ({s.grade})"
             for s in identified.segments
         ]
     if identified.sides is not None:

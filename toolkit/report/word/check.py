@@ -14,12 +14,12 @@ from collections.abc import Iterator, Mapping
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag
 from toolkit.report.vocabulary import Vocabulary
+from toolkit.report.word.fonts import missing_fonts, undrawn
 from toolkit.report.word.lint import (
     RULES,
     LintFinding,
     at_element,
     cut_in_two,
-    missing_fonts,
     surroundings,
     unprinted,
 )
@@ -106,6 +106,17 @@ def check_stories(
                 message=f"font {name!r} is not installed and will be replaced: check the layout of the PDF",
             )
             for name in missing_fonts(package, parts)
+        ]
+        findings += [
+            LintFinding(
+                rule="character-undrawn",
+                level="warning",
+                part=story.name,
+                place="text",
+                message=f"no installed font has {', '.join(boxes[:5])}: empty boxes are printed",
+            )
+            for story in parts
+            if (boxes := undrawn("".join(text.text or "" for text in story.root.iter(W_T))))
         ]
     return tuple(sorted(findings, key=lambda finding: finding.level != "error"))
 

@@ -10,10 +10,8 @@ What a document must show is printed whatever the test has, and however long it 
 from __future__ import annotations
 
 import re
-import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Literal
 from urllib.parse import unquote
 
@@ -24,7 +22,6 @@ from toolkit.report.word.pages import headers_shown
 from toolkit.report.word.scan import LITERAL, Site, control_tag, place_of
 from toolkit.report.word.toc import can_update, contents_fields
 from toolkit.report.word.xml import (
-    NS,
     SDT_CONTENT,
     W_P,
     W_SDT,
@@ -61,6 +58,7 @@ RULES = {
     "contents": "a table of contents or an index is of a kind that is not updated",
     "missing-style": "a style that the style file names is not in the template",
     "font-unavailable": "a font is not installed and will be replaced",
+    "character-undrawn": "no installed font has a character of the text",
     "placeholder": "a text stands for what somebody was to write there",
     "header-row": "the header row of a table is not repeated on the next page",
     "split-row": "a row of a table may break across pages",
@@ -252,88 +250,6 @@ def _aside(story: Story) -> Iterator[LintFinding]:
     for element, where in {id(element): (element, where) for element, where in findings}.values():
         message = f"a literal tag stands in {where}, where nothing is filled"
         yield at_element("wrong-place", story, element, message, "error")
-
-
-# Which fonts a template asks for, and which of them this machine cannot show as they are.
-
-
-# Fonts of equal metrics: a text keeps its line breaks.
-_EQUAL = {
-    "calibri": "carlito",
-    "cambria": "caladea",
-    "arial": "liberation sans",
-    "helvetica": "liberation sans",
-    "times new roman": "liberation serif",
-    "times": "liberation serif",
-    "courier new": "liberation mono",
-}
-_SYMBOLS = ("symbol", "wingdings", "wingdings 2", "wingdings 3", "webdings")
-
-
-@cache
-def installed_fonts() -> frozenset[str]:
-    """Return the families that fontconfig knows, in lower case; empty where it is not installed."""
-    try:
-        process = subprocess.run(["fc-list", ":", "family"], capture_output=True, timeout=20, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return frozenset()
-    text = process.stdout.decode("utf-8", "replace").replace("\n", ",")
-    return frozenset(name.strip().lower() for name in text.split(",") if name.strip())
-
-
-def missing_fonts(package: object, parts: list[Story]) -> list[str]:
-    """Return the fonts of the text and its styles that are not installed, nor one of equal metrics."""
-    have = installed_fonts()
-    if not have:
-        return []
-    named_fonts = {name for name in _wanted(package, parts) if name}
-    return sorted(
-        name
-        for name in named_fonts
-        if name.lower() not in have and _EQUAL.get(name.lower()) not in have and name.lower() not in _SYMBOLS
-    )
-
-
-def _wanted(package: object, parts: list[Story]) -> Iterator[str]:
-    main = package.main_document_part  # type: ignore[attr-defined]
-    theme = _theme(main)
-    styles = {
-        e.get(q("w:val"))
-        for story in parts
-        for tag in ("pStyle", "rStyle", "tblStyle")
-        for e in story.root.iter(q(f"w:{tag}"))
-    }
-    for story in parts:
-        for fonts in story.root.iter(q("w:rFonts")):
-            yield from _names(fonts, theme)
-    root = main._styles_part.element
-    for style in root.iter(q("w:style"), q("w:rPrDefault")):
-        default = style.tag == q("w:rPrDefault") or style.get(q("w:default")) == "1"
-        if default or style.get(q("w:styleId")) in styles:
-            for fonts in style.iter(q("w:rFonts")):
-                yield from _names(fonts, theme)
-
-
-def _names(fonts: Element, theme: dict[str, str]) -> Iterator[str]:
-    for side in ("ascii", "hAnsi"):
-        theme_name = fonts.get(q(f"w:{side}Theme"))
-        yield theme.get(theme_name[:5], "") if theme_name else fonts.get(q(f"w:{side}")) or ""
-
-
-def _theme(main: object) -> dict[str, str]:
-    from lxml import etree
-
-    from toolkit.report.word.xml import parser
-
-    for rel in main.rels.values():  # type: ignore[attr-defined]
-        if rel.reltype.endswith("/theme") and not rel.is_external:
-            root = etree.fromstring(rel.target_part.blob, parser())
-            return {
-                kind: latin.get("typeface") or ""
-                for kind in ("minor", "major")
-                if (latin := root.find(f".//a:{kind}Font/a:latin", NS)) is not None
-            }
-    return {}
 
 
 _CHANGES = {"begin": 1, "end": -1}

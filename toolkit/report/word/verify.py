@@ -15,6 +15,7 @@ from typing import Any
 
 from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.filled import Filled, text_elements
+from toolkit.report.word.fonts import undrawn
 from toolkit.report.word.legible import seen
 from toolkit.report.word.pages import PAGE_MARK
 from toolkit.report.word.printed import hard_to_extract, unprinted
@@ -255,6 +256,7 @@ def verify_pdf(pdf: Path, filled: Filled) -> tuple[tuple[Check, ...], int]:
             *_charts(text, filled),
             _legible(pdf, filled, hidden),
             _fonts(listing),
+            *_glyphs(text, filled),
             Check(name="pages", ok=pages > 0 and text.count("\f") == pages, message=f"{pages} pages"),
             Check(
                 name="figures",
@@ -375,6 +377,15 @@ def _fonts(listing: str) -> Check:
         if len(words) >= 6 and words[-5] != "yes":
             loose.append(words[0])
     return Check(name="fonts", ok=not loose, message=", ".join(loose) or "all fonts embedded")
+
+
+def _glyphs(text: str, filled: Filled) -> list[Check]:
+    """Warn of characters that are printed as empty boxes: a PDF's text holds them nevertheless."""
+    boxes = undrawn(text + "".join(entry.text for entry in filled.manifest))
+    if not boxes:
+        return []
+    message = f"no installed font has {', '.join(boxes[:5])}: empty boxes are printed"
+    return [Check(name="glyphs", ok=False, warning=True, message=message)]
 
 
 def _line(info: str, name: str) -> str:
