@@ -53,7 +53,7 @@ def drawn(design: Design, seed: int) -> TestResult:
     noisy = []
     for place, condition in enumerate(bare.conditions):
         by_channel = moved[round(condition.FZ), condition.rotation]
-        z = rng.standard_normal(4) * np.sqrt(VARIANCES)
+        z = rng.standard_normal(7) * np.sqrt(VARIANCES)
         rows = rng.standard_normal(2) * ROWS
         FY = condition.FY + float(by_channel["FY"][:, place % len(degrees)] @ z) + rows[0]
         MZ = condition.MZ + float(by_channel["MZ"][:, place % len(degrees)] @ z) + rows[1]
