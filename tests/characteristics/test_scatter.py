@@ -73,8 +73,8 @@ def test_perfect_curves_leave_no_scatter() -> None:
 def test_what_all_loads_of_a_file_share_has_the_freedoms_of_one_load(cause: str, freedoms: int) -> None:
     """One error a file: three loads are three readings of the same 13 errors, from which 6 parameters go.
 
-    Of both directions 14 freedoms are left, as of a single load, and as many more where FY and MZ show the same
-    error of the slip angle; each block by itself would give three times as many.
+    Of both directions 14 freedoms are left, as of a single load, and as many more where FY and MZ show the
+    same error of the slip angle; each block by itself would give three times as many.
     """
     rng = np.random.default_rng(11)
     base = reduced_test(loads=THREE, u=(0.5, 0.02))

@@ -6,13 +6,14 @@ from block to block, and that is seen about the curves. The error of a condition
 
     channel:  a          load of the block:  dy/dFZ_i b          slip angle of the block:  dy/dSA_i c
 
-with a for FY and for MZ, and b and c that move both channels of a block together. What goes with the rest of
-the steering, a zero of the channels that moves from file to file and where the angle comes to rest, is the
-same at all loads of the rest: a further a for FY and for MZ, and a further c. Their variances are those of the largest restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of the residuals of
+with a for FY and for MZ, and b and c that move both channels of a block together. What goes with the rest
+of the steering, a zero of the channels that moves from file to file and where the angle comes to rest, is
+the same at all loads of the rest: a further a for FY and for MZ, and a further c. Their variances are those
+of the largest restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of the residuals of
 all curves at once, by scoring with non-negative variances; a single curve has seven degrees of freedom and
 its own variance says little. At zero slip FY hardly follows the load, and an error of the load is not taken
-for one of conicity. Degrees of freedom are Satterthwaite's, from the information on the variances: of what all
-loads of a rest share, the residuals of further loads say nothing new.
+for one of conicity. Degrees of freedom are Satterthwaite's, from the information on the variances: of what
+all loads of a rest share, the residuals of further loads say little that is new.
 
 What a curve's form misses stands among the residuals too and widens ``a``.
 """
@@ -46,8 +47,8 @@ _NO_DATA = 1e-8
 class Sensitivity:
     """What one direction's conditions are moved by: (sources, conditions) for each channel.
 
-    Sources: FY, MZ [1], the load of a block [N/N, N·m/N], its slip angle [N/rad, N·m/rad]; then FY, MZ and the
-    slip angle of a rest. ``rests`` (conditions,) numbers the rest of each condition within the test.
+    Sources: FY, MZ [1], the load of a block [N/N, N·m/N], its slip angle [N/rad, N·m/rad]; then FY, MZ and
+    the slip angle of a rest. ``rests`` (conditions,) numbers the rest of each condition within the test.
     """
 
     by_channel: Mapping[Channel, Array]

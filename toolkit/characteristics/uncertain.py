@@ -20,8 +20,8 @@ class Part:
     """One variable's signed share ``u`` of a standard uncertainty, in the unit of the value.
 
     ``source`` is the line of the budget that it belongs to; ``dof`` its degrees of freedom. Parts of one
-    ``pool`` are independent variables whose sizes rest on one estimate of variance: what makes the estimate too
-    small makes all of them too small, and their degrees of freedom do not add up.
+    ``pool`` are independent variables whose sizes rest on one estimate of variance: what makes the estimate
+    too small makes all of them too small, and their degrees of freedom do not add up.
     """
 
     source: str
