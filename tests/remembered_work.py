@@ -9,12 +9,14 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.remembered import remembered
-from toolkit import pipeline
+from tests.remembered import once, remembered
+from toolkit import pipeline, testfile
+from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.lab.tire_tests import tire_files
 from toolkit.report import drawer, figures
 from toolkit.report.content import Plot
@@ -24,7 +26,7 @@ from toolkit.tires.global_model import GlobalModel
 
 @contextlib.contextmanager
 def remembered_work() -> Iterator[None]:
-    """Have commands reduce a test, fit the tire of one and draw a figure once, whoever asks."""
+    """Have commands reduce and read a test, fit the tire of one and draw a figure once, whoever asks."""
     process = remembered(pipeline.process)
 
     @functools.wraps(process.__wrapped__)
@@ -35,11 +37,21 @@ def remembered_work() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "process", processed)
+        patch.setattr(testfile, "read_test_file", _read)
         patch.setattr(tire_files, "fit_test_tire", remembered(tire_files.fit_test_tire))
         patch.setattr(global_fit, "fit_global", _fitted)
         patch.setattr(figures, "draw", remembered(figures.draw))
         patch.setattr(drawer, "Drawer", _Here)
         yield
+
+
+_read_test_file = testfile.read_test_file
+
+
+@functools.wraps(_read_test_file)
+def _read(path: Path) -> Any:
+    # A file is known by its content; what cannot be opened is refused as the command refuses it.
+    return once(("read_test_file", read_input(path, RECORDING_FILE)), lambda: _read_test_file(path))
 
 
 _fit = global_fit.fit_global

@@ -15,11 +15,12 @@ from typing import Any
 import pytest
 import typer
 
+from tests.declared_answers import departures
 from toolkit.cli.command import Command, answers
 from toolkit.cli.groups import build_group, declared_answers, declared_type, leaves
 from toolkit.cli.main import command_tree, run
 from toolkit.cli.options import Json, Output, RegistryOptions
-from toolkit.declared.answers import answer_schema, departures, tables_of
+from toolkit.declared.answers import answer_schema, tables_of
 from toolkit.lab.home import packaged_home
 from toolkit.simulation.plan import Plan
 from toolkit.simulation.run import simulate

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
 import pytest
 
-from toolkit.declared.answers import answer_reference, answer_schema, departures, entry_of
+from tests.declared_answers import departures
+from toolkit.declared.answers import answer_reference, answer_schema, entry_of
 
 
 class Row(TypedDict):

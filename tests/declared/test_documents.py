@@ -14,8 +14,9 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
+from tests.declared_answers import departures
 from toolkit.declared import Entry, Keyed, OrNan, answer, derived, json_value, object_of
-from toolkit.declared.answers import answer_reference, answer_schema, departures
+from toolkit.declared.answers import answer_reference, answer_schema
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

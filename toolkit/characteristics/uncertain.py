@@ -93,11 +93,24 @@ def _estimates(parts: Iterable[Part]) -> list[tuple[float, float]]:
 
 def merged(parts: Iterable[Part]) -> tuple[Part, ...]:
     """Return parts with one entry a key, their signed shares added; those that vanish are left out."""
-    by_key: dict[str, Part] = {}
-    for part in parts:
-        before = by_key.get(part.key)
-        by_key[part.key] = part if before is None else replace(before, u=before.u + part.u)
-    return tuple(part for part in by_key.values() if part.u)
+    return _merged((1.0, part) for part in parts)
+
+
+def _merged(weighted_parts: Iterable[tuple[float, Part]]) -> tuple[Part, ...]:
+    # A comparison adds up a million parts: each variable becomes a part once, when its sum is known.
+    first: dict[str, Part] = {}
+    shares: dict[str, float] = {}
+    for weight, part in weighted_parts:
+        key, share = part.key, part.u * weight
+        if key in shares:
+            shares[key] += share
+        else:
+            first[key], shares[key] = part, share
+    return tuple(
+        Part(source=first[key].source, key=key, u=share, dof=first[key].dof)
+        for key, share in shares.items()
+        if share
+    )
 
 
 def weighted(terms: Sequence[tuple[float, Uncertain]]) -> Uncertain:
@@ -106,5 +119,5 @@ def weighted(terms: Sequence[tuple[float, Uncertain]]) -> Uncertain:
     return Uncertain(
         value=sum(weight * number.value for weight, number in terms),
         unit=first.unit,
-        parts=merged(replace(part, u=part.u * weight) for weight, number in terms for part in number.parts),
+        parts=_merged((weight, part) for weight, number in terms for part in number.parts),
     )

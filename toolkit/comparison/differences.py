@@ -127,24 +127,25 @@ def at_load(rows: Sequence[Row], load_N: float, *, owner: str) -> Uncertain | No
     below = [row for row in ordered if row.load_N <= load_N]
     start = min(max(len(below) - 1, 0), len(ordered) - 2)
     pair = ordered[start : start + 2]
-    line = _through(pair, load_N)
     if len(ordered) == 2:
+        line = weighted(_through(pair, load_N))
         steep = (pair[1].number.value - pair[0].number.value) / (pair[1].load_N - pair[0].load_N)
         return _with(line, steep * (load_N - near[0].load_N) / 2, key)
     third = min((row for row in ordered if row not in pair), key=lambda row: abs(row.load_N - load_N))
-    parabola = _through(sorted([*pair, third], key=lambda row: row.load_N), load_N)
-    return _with(parabola, parabola.value - line.value, key)
+    parabola = weighted(_through(sorted([*pair, third], key=lambda row: row.load_N), load_N))
+    straight = sum(weight * number.value for weight, number in _through(pair, load_N))
+    return _with(parabola, parabola.value - straight, key)
 
 
-def _through(rows: Sequence[Row], load_N: float) -> Uncertain:
-    """Return Lagrange's polynomial through the rows at a load."""
+def _through(rows: Sequence[Row], load_N: float) -> list[tuple[float, Uncertain]]:
+    """Return the terms of Lagrange's polynomial through the rows at a load."""
     terms = []
     for row in rows:
         weight = math.prod(
             (load_N - node.load_N) / (row.load_N - node.load_N) for node in rows if node is not row
         )
         terms.append((weight, row.number))
-    return weighted(terms)
+    return terms
 
 
 def _with(number: Uncertain, half_width: float, key: str) -> Uncertain:

@@ -1,4 +1,4 @@
-"""Answers declared as typed dictionaries: the page that describes one, its schema, and what departs from it.
+"""Answers declared as typed dictionaries: the page that describes one, and its schema.
 
 An answer is what a command prints with ``--json``. The function that builds it returns a `TypedDict`, so that
 the type checker holds its keys and values to the declaration; page and schema are of the same lines:
@@ -20,8 +20,6 @@ The largest force.
 | `FY_N` | number | lateral force |
 | `at_rad` | number or null | slip angle; null where the peak was not reached |
 <BLANKLINE>
->>> list(departures({"FY_N": "much"}, Peak))
-["FY_N: 'much' is no number", 'at_rad: missing']
 
 An entry that repeats attributes of objects is filled from them: its keys stand in the declaration alone.
 
@@ -170,51 +168,6 @@ def tables_of(cls: Any, *, described: dict[Any, None] | None = None) -> Iterator
     return _tables(cls, "", {} if described is None else described)
 
 
-def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
-    """Yield each place where an answer, as JSON or before it is written, is not what is declared."""
-    annotation = _bare(annotation)[0]
-    origin, inner = get_origin(annotation), get_args(annotation)
-    if annotation is Any:
-        return
-    if _is_table(annotation) and isinstance(value, Mapping):
-        entries = {key: (held, required) for key, held, required in _declared(annotation)}
-        for key in (*entries, *(key for key in value if key not in entries)):
-            path = f"{place}.{key}".lstrip(".")
-            if key not in entries:
-                yield f"{path}: not declared"
-            elif key in value:
-                yield from departures(value[key], entries[key][0], path)
-            elif entries[key][1]:
-                yield f"{path}: missing"
-    elif origin in (Union, types.UnionType):
-        tried = [list(departures(value, form, place)) for form in inner]
-        # What comes nearest is what was meant: the form with the fewest departures below the place itself.
-        if all(tried):
-            yield from min(tried, key=lambda faults: (f"{place}: " in faults[0], len(faults)))
-    elif origin is Literal:
-        if value not in inner:
-            yield f"{place}: {value!r} is none of {', '.join(map(str, inner))}"
-    elif _is_mapping(origin) and isinstance(value, Mapping):
-        for key, entry in value.items():
-            yield from departures(entry, inner[1], f"{place}.{key}")
-    elif _is_list(origin) and isinstance(value, Sequence | Iterator) and not isinstance(value, str):
-        for at, entry in enumerate(value):
-            fixed = origin is tuple and inner[-1] is not Ellipsis
-            yield from departures(entry, inner[at] if fixed else inner[0], f"{place}[{at}]")
-    elif not _holds(value, annotation):
-        yield f"{place}: {value!r:.60} is no {words_of(annotation)}"
-
-
-def _holds(value: Any, annotation: Any) -> bool:
-    if annotation is float:
-        return isinstance(value, float | int) and not isinstance(value, bool)
-    if annotation in (pathlib.Path, dt.date):
-        return isinstance(value, annotation | str)
-    if annotation is int:
-        return isinstance(value, int) and not isinstance(value, bool)
-    return annotation in _WORDS and isinstance(value, annotation)
-
-
 def _is_table(annotation: Any) -> bool:
     return is_typeddict(annotation) or (isinstance(annotation, type) and dataclasses.is_dataclass(annotation))
 
@@ -238,6 +191,7 @@ def _but_null(annotation: Any) -> Any:
     return Annotated[(functools.reduce(operator.or_, forms), *marks)]
 
 
+@functools.cache
 def _bare(annotation: Any) -> tuple[Any, str]:
     """Return an annotation without its marks, and the text beside it."""
     meaning = ""

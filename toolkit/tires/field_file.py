@@ -26,6 +26,7 @@ from toolkit.errors import CellError, ColumnError, UnreadableError
 from toolkit.files import reads_as_number
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import decimal_sign, decode
+from toolkit.recording.formats.vectors import read_by_library
 from toolkit.recording.safe_open import gate
 from toolkit.recording.sniff import sniff
 from toolkit.units import split_header, unit
@@ -114,7 +115,11 @@ def _of_mat(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
     from scipy.io import loadmat
 
     stream: Any = io.BytesIO(data)
-    try:
+    with read_by_library(
+        "the MAT-file holds no test in the consortium's form", where=path,
+        expected="a vector for each channel, and a structure 'channel' with the lists 'name' and 'units'",
+        next_step="save it again with save(name, '-v7')",
+    ):  # fmt: skip
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             variables = loadmat(stream, chars_as_strings=True)
@@ -125,13 +130,6 @@ def _of_mat(data: bytes, path: Path) -> dict[str, tuple[NDArray[Any], str]]:
             for name, text in zip(names, units, strict=True)
             if name in variables
         }
-    except Exception as error:
-        raise UnreadableError(
-            "the MAT-file holds no test in the consortium's form", where=path,
-            got=f"{type(error).__name__}: {error}"[:300],
-            expected="a vector for each channel, and a structure 'channel' with the lists 'name' and 'units'",
-            next_step="save it again with save(name, '-v7')", rule="unreadable",
-        ) from error  # fmt: skip
 
 
 def _texts(cells: NDArray[Any]) -> list[str]:

@@ -99,10 +99,10 @@ HIDDEN = {
 """What is concealed in the speed's equation [N/kg], as it is taken from the rate."""
 
 
-def _moved(hidden, seed: int, number: int) -> pd.DataFrame:
-    """A mass on a spring whose k is 41 and d 1.05 with a concealed term; the noise is 4 mm."""
+def _moved(hidden, seed: int, number: int, rows: int) -> pd.DataFrame:
+    """A mass on a spring whose k is 41 and d 1.05 with a concealed term, for 10 s; the noise is 4 mm."""
     rng = np.random.default_rng(1000 * seed + number)
-    t = np.arange(250) * 0.04
+    t = np.arange(rows) * (10 / rows)
     phase = rng.uniform(0, 6, 3)
     force = sum(a * np.sin(w * t + p) for a, w, p in zip((12, 9, 6), (3.1, 5.2, 1.3), phase, strict=True))
 
@@ -114,12 +114,12 @@ def _moved(hidden, seed: int, number: int) -> pd.DataFrame:
     return pd.DataFrame({"t": t, "F": force, "X": y[0] + rng.normal(0, 0.004, len(t))})
 
 
-def _diagnosed(folder: Path, hidden, seed: int = 0) -> dict:
+def _diagnosed(folder: Path, hidden, seed: int = 0, rows: int = 250) -> dict:
     (folder / "sim.py").write_text(SIMULATOR)
     runs = "".join(f'[[recording.run]]\nfile = "r{i}.csv"\n' for i in range(3))
     (folder / "case.toml").write_text(HEAD + runs)
     for i in range(3):
-        _moved(hidden, seed, i).to_csv(folder / f"r{i}.csv", index=False)
+        _moved(hidden, seed, i, rows).to_csv(folder / f"r{i}.csv", index=False)
     return json_value(diagnose(read_case(folder / "case.toml"), None).diagnosis)
 
 
@@ -146,7 +146,7 @@ def test_a_law_of_an_input_and_a_state_is_learned(tmp_path):
 
 def test_an_effect_that_only_imitates_a_law_is_not_named(tmp_path):
     # A wrong sensitivity of the force takes most of its square's answer, and the law takes all of it.
-    answer = _diagnosed(tmp_path, HIDDEN["a force that grows with its square"])
+    answer = _diagnosed(tmp_path, HIDDEN["a force that grows with its square"], rows=125)
     assert (answer["verdict"], answer["effects"]) == ("unknown", [])
     (law,) = answer["laws"]
     assert (law["place"], law["formula"]) == ({"kind": "state", "channel": "v"}, "a*F*abs(F)")

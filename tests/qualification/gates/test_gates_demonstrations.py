@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,6 +53,7 @@ def checks(tmp_path_factory: pytest.TempPathFactory) -> list[Check]:
     return demonstrated(tmp_path_factory)[0]
 
 
+@functools.cache
 def rules_of_source() -> set[str]:
     """Return every rule that blocks in the source: of gates, of departures, of errors of the registry."""
     trees = {path: ast.parse(path.read_text()) for path in SOURCES}

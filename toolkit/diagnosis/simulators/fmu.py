@@ -19,20 +19,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.diagnosis.simulators.python import PythonModel
+from toolkit.diagnosis.simulators.python import LARGEST, PythonModel, apart
 from toolkit.errors import ConfigError, FitError, UnitError
 from toolkit.inputs import FMU_FILE, read_regular
 from toolkit.spelling import nearest
 from toolkit.units import unit
 
 if TYPE_CHECKING:
-    from toolkit.arrays import Array, Arrays
+    from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.case_code import CaseCode
     from toolkit.worker.serve import Handlers
 
 
-_LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
 _UNPACKED = 2**30  # bytes: what the temporary folder of an isolated worker holds
 _EVEN = 1e-6  # of a step, by which rows of one distance may differ
 
@@ -71,11 +70,11 @@ class FmuFunction:
         if self._description.coSimulation is None:
             raise self._unusable("a unit of model exchange alone", "co-simulation, which has its own solver")
         self._inputs = [
-            (channel, self._variable(name, self._unit_of(channel), ("input",)))
+            (channel, self._variable(name, case.unit(channel), ("input",)))
             for name, channel in self._pairs(case.simulation.fmu_inputs, ("input",))
         ]
         self._outputs = [
-            (channel, self._variable(name, self._unit_of(channel), ("output", "local")))
+            (channel, self._variable(name, case.unit(channel), ("output", "local")))
             for channel, name in (
                 (output.name, dict(case.simulation.fmu_outputs).get(output.name, output.name))
                 for output in case.outputs
@@ -116,8 +115,8 @@ class FmuFunction:
         result = {}
         for (name, variable), values in zip(self._outputs, np.array(rows).T, strict=True):
             column = values / variable.factor
-            if not (np.abs(column) <= _LARGEST).all():
-                bad = int(np.flatnonzero(~(np.abs(column) <= _LARGEST))[0]) + 1
+            if not (np.abs(column) <= LARGEST).all():
+                bad = int(np.flatnonzero(~(np.abs(column) <= LARGEST))[0]) + 1
                 raise self._failed(run, f"no number in {variable.name!r}, row {bad}")
             result[name] = column
         return result
@@ -181,9 +180,6 @@ class FmuFunction:
             if variable.causality in causality and variable.name in channels:
                 pairs.setdefault(variable.name, variable.name)
         return list(pairs.items())
-
-    def _unit_of(self, channel: str) -> str:
-        return self.case.unit(channel)
 
     def _variable(self, name: str, case_unit: str, causality: tuple[str, ...]) -> _Variable:
         variables = {variable.name: variable for variable in self._description.modelVariables}
@@ -256,23 +252,16 @@ def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
     """Return the simulation of a case of this kind; ConfigError where its unit cannot be used."""
     if code is None:
         return PythonModel(case, FmuFunction(case).call)
-    apart = code
-    apart.begin(handlers)
+    code.begin(handlers)
 
-    def answer(run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
-        shapes = {output.name: (run.rows,) for output in case.outputs}
-        outputs = apart.arrays("call", run, p, shapes, dict(changed))
-        for name, values in outputs.items():
-            if not (np.abs(values) <= _LARGEST).all():  # the unit may have answered past the check there
-                raise FitError(
-                    "the FMU gives no usable output", where=f"{case.file()}, {run.name}",
-                    got=f"no number in {name!r}", expected="a finite number at every row",
-                    next_step="run the FMU on that file by itself",
-                    rule="simulator",
-                )  # fmt: skip
-        return outputs
+    def failed(run: Run, name: str) -> FitError:
+        return FitError(
+            "the FMU gives no usable output", where=f"{case.file()}, {run.name}",
+            got=f"no number in {name!r}", expected="a finite number at every row",
+            next_step="run the FMU on that file by itself", rule="simulator",
+        )  # fmt: skip
 
-    return PythonModel(case, answer)
+    return PythonModel(case, apart(case, code, failed))
 
 
 def handlers(case: Case) -> Handlers:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Answer = Callable[[Run, Mapping[str, float], Mapping[str, Array]], Arrays]
 
 _KEPT = 300  # simulations that are remembered
-_LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
+LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
 # Drive's field -> the channel that a simulator takes it from.
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
 
@@ -95,8 +95,8 @@ class UserFunction:
                 raise _failed(
                     self.case, run, f"no number in column {output.name!r}, row {_first_bad(values)}"
                 )
-            if np.abs(values).max(initial=0.0) > _LARGEST:
-                raise _failed(self.case, run, f"values beyond {_LARGEST:.0e} in column {output.name!r}")
+            if np.abs(values).max(initial=0.0) > LARGEST:
+                raise _failed(self.case, run, f"values beyond {LARGEST:.0e} in column {output.name!r}")
             result[output.name] = values
         return result
 
@@ -197,18 +197,24 @@ def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
     """Return the simulation of a case of this kind; ConfigError where its file has no such function."""
     if code is None:
         return PythonModel(case, UserFunction(case).call)
-    apart = code
-    apart.begin(handlers)
+    code.begin(handlers)
+    return PythonModel(
+        case, apart(case, code, lambda run, name: _failed(case, run, f"no number in column {name!r}"))
+    )
+
+
+def apart(case: Case, code: CaseCode, failed: Callable[[Run, str], FitError]) -> Answer:
+    """Return the answers of a simulator in a worker; ``failed`` is the error of an output without numbers."""
 
     def answer(run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
         shapes = {output.name: (run.rows,) for output in case.outputs}
-        outputs = apart.arrays("call", run, p, shapes, dict(changed))
+        outputs = code.arrays("call", run, p, shapes, dict(changed))
         for name, values in outputs.items():
-            if not (np.abs(values) <= _LARGEST).all():  # the code may have answered past the check there
-                raise _failed(case, run, f"no number in column {name!r}")
+            if not (np.abs(values) <= LARGEST).all():  # the code may have answered past the check there
+                raise failed(run, name)
         return outputs
 
-    return PythonModel(case, answer)
+    return answer
 
 
 def handlers(case: Case) -> Handlers:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from toolkit.arrays import Array
 from toolkit.calibration.records.use import CalibrationUse, UsedRecord
-from toolkit.errors import ConfigError, OutputError, UnreadableError
+from toolkit.errors import ConfigError, OutputError
 from toolkit.findings import Finding, FindingEntry
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.lab.records.record import Loads, Record
@@ -26,7 +26,7 @@ from toolkit.recording.columns import rig
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.mdf import mdf_bytes
 from toolkit.recording.formats.tdms import tdms_bytes
-from toolkit.recording.formats.vectors import Vector, Vectors, Written, series_of
+from toolkit.recording.formats.vectors import Vector, Vectors, Written, read_by_library, series_of
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.marks import GENERATOR, OWN_OUTPUT, STAMP
 from toolkit.recording.model import Series
@@ -77,16 +77,13 @@ def read_indications(path: Path, record: Record) -> tuple[tuple[Series, ...], li
 
 def _parquet(data: bytes, path: Path) -> Vectors:
     parquet: Any = needed("pyarrow.parquet", extra="parquet", to="read a Parquet table", where=path)
-    try:
+    with read_by_library(
+        "the Parquet table cannot be read", where=path,
+        expected="a Parquet file with one column a channel, 'NAME [unit]'", next_step="write it again",
+    ):  # fmt: skip
         table = parquet.read_table(io.BytesIO(data))
         names = table.column_names
         columns = [np.asarray(table.column(at).to_numpy()) for at in range(len(names))]
-    except Exception as error:
-        raise UnreadableError(
-            "the Parquet table cannot be read", where=path, got=f"{type(error).__name__}: {error}"[:300],
-            expected="a Parquet file with one column a channel, 'NAME [unit]'",
-            next_step="write it again", rule="unreadable",
-        ) from error  # fmt: skip
     vectors = [
         Vector(name=name, unit=None, values=values) for name, values in zip(names, columns, strict=True)
     ]

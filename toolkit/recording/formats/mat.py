@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.errors import UnreadableError
 from toolkit.inputs import RECORDING_FILE, limit_of
 from toolkit.machine import Machine
 from toolkit.recording.formats.vectors import (
@@ -35,6 +34,7 @@ from toolkit.recording.formats.vectors import (
     no_numbers,
     one_table,
     quantum,
+    read_by_library,
     too_large,
     truncated,
     version,
@@ -179,19 +179,13 @@ def read_mat(data: bytes, where: object, machine: Machine) -> Vectors:
     from scipy.io import loadmat
 
     stream: Any = io.BytesIO(data)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # such as two variables of one name
-            contents = loadmat(stream, chars_as_strings=True)
-    except Exception as error:
-        raise UnreadableError(
-            "the MAT-file cannot be read",
-            where=where,
-            got=f"{type(error).__name__}: {error}"[:300],
-            expected="a MAT-file of version 5 to 7",
-            next_step="save it again with save(name, '-v7')",
-            rule="unreadable",
-        ) from error
+    refused = read_by_library(
+        "the MAT-file cannot be read", where=where, expected="a MAT-file of version 5 to 7",
+        next_step="save it again with save(name, '-v7')",
+    )  # fmt: skip
+    with refused, warnings.catch_warnings():
+        warnings.simplefilter("error")  # such as two variables of one name
+        contents = loadmat(stream, chars_as_strings=True)
     variables = {name: value for name, value in contents.items() if not name.startswith("__")}
     if DATA in variables and HEADERS in variables:
         vectors = _columns(variables, where)

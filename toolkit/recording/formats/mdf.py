@@ -29,6 +29,7 @@ from toolkit.recording.formats.vectors import (
     damaged,
     one_table,
     quantum,
+    read_by_library,
     too_large,
     truncated,
     version,
@@ -251,30 +252,22 @@ def read_mdf(data: bytes, where: object, machine: Machine) -> Vectors:
     """
     asammdf: Any = needed("asammdf", extra="mdf", to="read an MDF file", where=where)
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what matters of it is said by an error
-    try:
-        with asammdf.MDF(io.BytesIO(data)) as file:
-            tables = [
-                Vectors(
-                    where=f"{where}, channel group {index + 1}",
-                    vectors=[
-                        _vector(file, index, place, channel, where)
-                        for place, channel in enumerate(group.channels)
-                    ],
-                )
-                for index, group in enumerate(file.groups)
-                if group.channel_group.cycles_nr
-            ]
-    except (UnreadableError, CellError):
-        raise
-    except Exception as error:
-        raise UnreadableError(
-            "the MDF file cannot be read",
-            where=where,
-            got=f"{type(error).__name__}: {error}"[:300],
-            expected="an MDF 4 file",
-            next_step="copy it again from the machine",
-            rule="unreadable",
-        ) from error
+    refused = read_by_library(
+        "the MDF file cannot be read", where=where, expected="an MDF 4 file",
+        next_step="copy it again from the machine",
+    )  # fmt: skip
+    with refused, asammdf.MDF(io.BytesIO(data)) as file:
+        tables = [
+            Vectors(
+                where=f"{where}, channel group {index + 1}",
+                vectors=[
+                    _vector(file, index, place, channel, where)
+                    for place, channel in enumerate(group.channels)
+                ],
+            )
+            for index, group in enumerate(file.groups)
+            if group.channel_group.cycles_nr
+        ]
     return one_table(tables, machine, where=where)
 
 

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.vectors import (
@@ -27,6 +26,7 @@ from toolkit.recording.formats.vectors import (
     no_numbers,
     one_table,
     quantum,
+    read_by_library,
     truncated,
     version,
 )
@@ -187,29 +187,21 @@ def read_tdms(data: bytes, where: object, machine: Machine) -> Vectors:
         logging.CRITICAL
     )
     counts = walk_tdms(data, where)
-    try:
-        with nptdms.TdmsFile.open(io.BytesIO(data), raw_timestamps=True) as file:
-            channels = [(group.name, channel) for group in file.groups() for channel in group.channels()]
-            _check_counts(channels, counts, where)
-            names = dict.fromkeys(name for name, _ in channels)
-            tables = [
-                Vectors(
-                    where=f"{where}, group {name!r}",
-                    vectors=[_vector(channel) for group, channel in channels if group == name],
-                )
-                for name in names
-            ]
-    except UnreadableError:
-        raise
-    except Exception as error:
-        raise UnreadableError(
-            "the TDMS file cannot be read",
-            where=where,
-            got=f"{type(error).__name__}: {error}"[:300],
-            expected="a TDMS file as LabVIEW writes it",
-            next_step="copy it again from the machine",
-            rule="unreadable",
-        ) from error
+    refused = read_by_library(
+        "the TDMS file cannot be read", where=where, expected="a TDMS file as LabVIEW writes it",
+        next_step="copy it again from the machine",
+    )  # fmt: skip
+    with refused, nptdms.TdmsFile.open(io.BytesIO(data), raw_timestamps=True) as file:
+        channels = [(group.name, channel) for group in file.groups() for channel in group.channels()]
+        _check_counts(channels, counts, where)
+        names = dict.fromkeys(name for name, _ in channels)
+        tables = [
+            Vectors(
+                where=f"{where}, group {name!r}",
+                vectors=[_vector(channel) for group, channel in channels if group == name],
+            )
+            for name in names
+        ]
     return one_table(tables, machine, where=where)
 
 

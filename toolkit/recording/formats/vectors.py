@@ -4,7 +4,8 @@ for.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -56,6 +57,26 @@ class Written:
     def name(self) -> str:
         """The header without its unit."""
         return split_header(self.header)[0]
+
+
+@contextlib.contextmanager
+def read_by_library(what: str, *, where: object, expected: str, next_step: str) -> Iterator[None]:
+    """Refuse a file at which a library fails, whatever it raises; what is refused for a reason stays so.
+
+    Raises
+    ------
+    UnreadableError
+        rule ``unreadable``; ``what`` is its first sentence
+    """
+    try:
+        yield
+    except (UnreadableError, CellError):
+        raise
+    except Exception as error:
+        got = f"{type(error).__name__}: {error}"[:300]
+        raise UnreadableError(
+            what, where=where, got=got, expected=expected, next_step=next_step, rule="unreadable"
+        ) from error
 
 
 def one_table(tables: Sequence[Vectors], machine: Machine, *, where: object) -> Vectors:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from toolkit.calibration.fit.balance_report import BalanceReport
-from toolkit.calibration.fit.report import FitReport
+from toolkit.calibration.fit.balance_report import BalanceLoad, BalanceReport
+from toolkit.calibration.fit.report import Coefficient, FitReport
 from toolkit.estimate import plus_minus, round_uncertainty
 
 # Cook's distance over 4/n and a leverage over twice the mean are looked at (Cook and Weisberg, 1982).
@@ -24,23 +25,11 @@ def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
         "r_squared": report.r_squared,
         "predicted_r_squared": report.predicted_r_squared,
         "press": report.press,
-        "coefficients": {
-            c.term: {
-                "value": c.value,
-                "standard_error": c.standard_error,
-                "t": c.t,
-                "sign_confidence": c.sign_confidence,
-                "percent_fs": c.percent_fs,
-            }
-            for c in report.coefficients
-        },
+        "coefficients": {c.term: _entry_without(c, "term") for c in report.coefficients},
         "covariance": report.covariance.tolist(),
         "correlation": report.correlation.tolist(),
         "vif": dict(report.vif),
-        "lack_of_fit": None if lack is None else {
-            "F": lack.F, "probability": lack.probability, "lack_dof": lack.lack_dof,
-            "pure_dof": lack.pure_dof, "pure_error_sd": lack.pure_error_sd,
-        },
+        "lack_of_fit": None if lack is None else asdict(lack),
         "levels": report.levels,
         "replicated_rows": report.replicated_rows,
         "heteroscedasticity_p": report.heteroscedasticity,
@@ -52,10 +41,7 @@ def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
         "tolerance_percent_fs": report.tolerance_percent_fs,
         "check_percent_fs": None if report.check_percent_fs is None else report.check_percent_fs.tolist(),
         "reversibility_percent_fs": report.reversibility_percent_fs,
-        "reversals": [
-            {"run": r.run, "load": r.load, "difference": r.difference, "percent_fs": r.percent_fs}
-            for r in report.reversals
-        ],
+        "reversals": [asdict(reversal) for reversal in report.reversals],
         "noise_free": report.noise_free,
     }  # fmt: skip
     if rows:
@@ -87,17 +73,7 @@ def balance_dict(report: BalanceReport) -> dict[str, Any]:
         "steps": report.steps,
         "newton_steps": report.newton_steps,
         "newton_difference": report.newton_difference,
-        "loads": {
-            load.load: {
-                "direct_sd_percent_fs": load.direct_sd_percent_fs,
-                "direct_max_percent_fs": load.direct_max_percent_fs,
-                "iterated_sd_percent_fs": load.iterated_sd_percent_fs,
-                "iterated_max_percent_fs": load.iterated_max_percent_fs,
-                "check_direct_percent_fs": load.check_direct_percent_fs,
-                "check_iterated_percent_fs": load.check_iterated_percent_fs,
-            }
-            for load in report.loads
-        },
+        "loads": {load.load: _entry_without(load, "load", "unit") for load in report.loads},
         "tares": None if tares is None else {
             "relative": tares.relative,
             "steps": tares.steps,
@@ -107,6 +83,10 @@ def balance_dict(report: BalanceReport) -> dict[str, Any]:
             ],
         },
     }  # fmt: skip
+
+
+def _entry_without(entry: BalanceLoad | Coefficient, *names: str) -> dict[str, Any]:
+    return {key: value for key, value in asdict(entry).items() if key not in names}
 
 
 def report_text(report: FitReport) -> str:
