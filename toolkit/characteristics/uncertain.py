@@ -107,7 +107,7 @@ def _merged(weighted_parts: Iterable[tuple[float, Part]]) -> tuple[Part, ...]:
         else:
             first[key], shares[key] = part, share
     return tuple(
-        Part(source=first[key].source, key=key, u=share, dof=first[key].dof)
+        Part(source=first[key].source, key=key, u=share, dof=first[key].dof, pool=first[key].pool)
         for key, share in shares.items()
         if share
     )
