@@ -267,3 +267,28 @@ def test_what_two_numbers_share_cancels_in_their_difference() -> None:
     # Welch-Satterthwaite, GUM G.4.1.
     assert difference.dof == pytest.approx(5.0**4 / (3.0**4 / 7 + 4.0**4 / 9))
     assert weighted([(1.0, one), (1.0, other)]).estimate().u == pytest.approx(math.sqrt(100 + 25))
+
+
+def test_two_directions_whose_scatter_is_one_estimate_have_its_degrees_of_freedom() -> None:
+    """(F - R)/2 of two values whose u follow from one s^2: t on the freedoms of s^2, not on twice as many.
+
+    Two values of one pool, 3 and 4 on 7 freedoms: u^2 is 25/9 of the first one's, and as sure as that one.
+    """
+    pooled = [
+        Uncertain(value=0.0, unit="N", parts=(Part(source="fit", key=key, u=u, dof=7, pool="s"),))
+        for key, u in (("a", 3.0), ("b", 4.0))
+    ]
+    estimate = weighted([(0.5, pooled[0]), (-0.5, pooled[1])]).estimate()
+    assert (estimate.u, estimate.dof) == (pytest.approx(2.5), pytest.approx(7))
+    rng = np.random.default_rng(3)
+    base = reduced_test()
+    drawn = dataclasses.replace(base, conditions=tuple(
+        dataclasses.replace(c, FY_common=c.FY_common + float(e), MZ_common=c.MZ_common + float(f))
+        for c, (e, f) in zip(base.conditions, rng.normal(size=(26, 2)) * (8.0, 0.3), strict=True)
+    ))  # fmt: skip
+    found = rows(drawn)
+    for name in ("conicity", "CRAT"):
+        number = found[name, LOAD, "both", None].number
+        fit = Uncertain(value=0.0, unit="N", parts=tuple(p for p in number.parts if p.source == "fit"))
+        assert len(fit.parts) == 2
+        assert fit.estimate().dof <= max(p.dof for p in fit.parts) * (1 + 1e-9)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.characteristics.tire_factory import LOAD, M15, at_load, reduced_test
+from tests.characteristics.tire_factory import LOAD, M15, at_load, reduced_test, tire
 from toolkit.characteristics.characterise import characterise
 from toolkit.characteristics.groups import directions_of
-from toolkit.characteristics.scatter import Scatter, scatter_of
+from toolkit.characteristics.scatter import Scatter, scatter_of, weights_of
 from toolkit.reduction.model import ReducedTest
+from toolkit.tires.models import model
 
 THREE = (2000.0, LOAD, 6000.0)
 
@@ -66,3 +67,34 @@ def test_perfect_curves_leave_no_scatter() -> None:
     found, directions = scatter(reduced_test(loads=THREE))
     for one in directions:
         assert np.sqrt(found.each(one, "FY")).max() < 1e-6
+
+
+@pytest.mark.parametrize(("cause", "freedoms"), [("channel", 14), ("slip angle", 28)])
+def test_what_all_loads_of_a_file_share_has_the_freedoms_of_one_load(cause: str, freedoms: int) -> None:
+    """One error a file: three loads are three readings of the same 13 errors, from which 6 parameters go.
+
+    Of both directions 14 freedoms are left, as of a single load, and as many more where FY and MZ show the
+    same error of the slip angle; each block by itself would give three times as many.
+    """
+    rng = np.random.default_rng(11)
+    base = reduced_test(loads=THREE, u=(0.5, 0.02))
+    error = {file: rng.normal(size=2) for file in sorted({c.file for c in base.conditions})}
+    moved = []
+    for c in base.conditions:
+        FY, MZ = (c.FY, c.MZ) + error[c.file] * (8.0, 0.3)
+        if cause == "slip angle":
+            SA = np.array([c.SA + error[c.file][0] * np.radians(0.05)])
+            FY, MZ = np.concatenate(tire(SA, reverse=c.rotation == "reverse", load=c.FZ))
+        rows = rng.normal(size=2) * (0.5, 0.02)
+        moved.append(dataclasses.replace(c, FY_common=float(FY + rows[0]), MZ_common=float(MZ + rows[1])))
+    found, directions = scatter(dataclasses.replace(base, conditions=tuple(moved)))
+    for one in directions:
+        fit = one.fit.FY
+        assert fit is not None
+        weights = {"FY": model(fit.model).jacobian(fit.values, 0.0) @ weights_of(one, "FY")}
+        u, dof = found.of(one, weights)
+        assert dof < 1.3 * freedoms
+        slope = found.directions[one.group.load_N, one.group.rotation].by_channel["FY"][3]
+        drawn = 8.0 if cause == "channel" else np.radians(0.05) * slope
+        low, high = np.sqrt(chi2.ppf([1e-4, 1 - 1e-4], 14) / 14)
+        assert low < u / np.linalg.norm(drawn * weights["FY"]) < high

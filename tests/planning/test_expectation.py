@@ -32,8 +32,9 @@ PLAN = Design(
 
 
 def test_what_an_expected_test_says_of_its_scatter_is_the_scatter() -> None:
-    found = scatter_of(earlier().directions(PROTOCOL), expected=VARIANCES)
-    np.testing.assert_allclose(found.variances, VARIANCES, rtol=1e-6)
+    expected = VARIANCES + np.array([0.0, 0.0, 0.0, 0.0, 2.0**2, 0.04**2, np.radians(0.003) ** 2])
+    found = scatter_of(earlier().directions(PROTOCOL), expected=expected)
+    np.testing.assert_allclose(found.variances, expected, rtol=1e-6)
 
 
 def test_with_few_freedoms_load_and_slip_angle_count_as_scatter_of_the_channels() -> None:
@@ -53,7 +54,7 @@ def drawn(design: Design, seed: int) -> TestResult:
     noisy = []
     for place, condition in enumerate(bare.conditions):
         by_channel = moved[round(condition.FZ), condition.rotation]
-        z = rng.standard_normal(4) * np.sqrt(VARIANCES)
+        z = rng.standard_normal(7) * np.sqrt(VARIANCES)
         rows = rng.standard_normal(2) * ROWS
         FY = condition.FY + float(by_channel["FY"][:, place % len(degrees)] @ z) + rows[0]
         MZ = condition.MZ + float(by_channel["MZ"][:, place % len(degrees)] @ z) + rows[1]

@@ -243,11 +243,13 @@ class Reader:
         tares = _norm(np.concatenate([w * self._tares[c] for c, w in weights.items()]))
         if self.scatter is not None and all(self.direction.curve(c) is not None for c in weights):
             scatter, dof = self.scatter.of(self.direction, weights)
+            pool = f"scatter/{shared.test}"
         else:
             # The fit's residuals hold the scatter of the rows already; where a curve follows its points more
             # closely than their own scatter allows, the scatter stands. Never both.
             u = _norm(np.array([factor * term.estimate.u for factor, term in terms]))
             scatter, dof = float(np.sqrt(max(u**2 - rows**2, 0.0))), first.estimate.dof
+            pool = ""
         parts: list[Part] = []
         for c, w in weights.items():
             parts += shared.calibration_parts(c, self._calibration[c] @ w)
@@ -255,7 +257,7 @@ class Reader:
         parts.append(self._own(channel, "tare", reading, tares))
         parts += [replace(part, u=factor * part.u) for factor, term in terms for part in term.angle]
         parts.append(self._own(channel, "repeatability", reading, rows))
-        parts.append(self._own(channel, "fit", reading, scatter, dof))
+        parts.append(replace(self._own(channel, "fit", reading, scatter, dof), pool=pool))
         return Uncertain(value=first.estimate.value, unit=first.estimate.unit, parts=merged(parts))
 
     def _own(self, channel: str, source: str, reading: str, u: float, dof: float = np.inf) -> Part:

@@ -1,4 +1,4 @@
-"""How conditions scatter about the curves of a test: three variances, by restricted likelihood.
+"""How conditions scatter about the curves of a test: seven variances, by restricted likelihood.
 
 The rows of a block say how sure their own mean is, and no more: a drum's run-out that the filter delays, a
 load that creeps, a steering that comes to rest elsewhere are the same in every row of the block. They differ
@@ -6,11 +6,14 @@ from block to block, and that is seen about the curves. The error of a condition
 
     channel:  a          load of the block:  dy/dFZ_i b          slip angle of the block:  dy/dSA_i c
 
-with a for FY and for MZ, and b and c that move both channels of a block together. Their variances are those
+with a for FY and for MZ, and b and c that move both channels of a block together. What goes with the rest
+of the steering, a zero of the channels that moves from file to file and where the angle comes to rest, is
+the same at all loads of the rest: a further a for FY and for MZ, and a further c. Their variances are those
 of the largest restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of the residuals of
 all curves at once, by scoring with non-negative variances; a single curve has seven degrees of freedom and
 its own variance says little. At zero slip FY hardly follows the load, and an error of the load is not taken
-for one of conicity. Degrees of freedom are Satterthwaite's, from the information on the variances.
+for one of conicity. Degrees of freedom are Satterthwaite's, from the information on the variances: of what
+all loads of a rest share, the residuals of further loads say little that is new.
 
 What a curve's form misses stands among the residuals too and widens ``a``.
 """
@@ -24,11 +27,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.arrays import Array
+from toolkit.channels import ROTATIONS
 from toolkit.characteristics.groups import CHANNELS, Channel, Direction
 from toolkit.reduction.common_load import at_one_angle, slopes
 from toolkit.tires.evaluate import slope_at, value_at
 from toolkit.tires.models import model
 
+_SOURCES = 7
+_CHANNEL = (0, 1, 4, 5)  # the sources that are errors of a channel; the others are of load and slip angle
+_OF_REST = (4, 5, 6)  # the sources that all loads of a rest share; the others are of single blocks
 _ENOUGH = 24  # residual freedoms from which on the variances of load and slip angle are told apart
 _STEPS, _SETTLED = 60, 1e-6
 _FLOOR = 1e-24  # of max|y|^2: rounding of conditions without noise
@@ -40,15 +47,21 @@ _NO_DATA = 1e-8
 class Sensitivity:
     """What one direction's conditions are moved by: (sources, conditions) for each channel.
 
-    Sources: FY, MZ [1], the load of a block [N/N, N·m/N], its slip angle [N/rad, N·m/rad].
+    Sources: FY, MZ [1], the load of a block [N/N, N·m/N], its slip angle [N/rad, N·m/rad]; then FY, MZ and
+    the slip angle of a rest. ``rests`` (conditions,) numbers the rest of each condition within the test.
     """
 
     by_channel: Mapping[Channel, Array]
+    rests: NDArray[np.intp]
+
+    def errors(self, source: int) -> NDArray[np.intp]:
+        """Return which of a source's errors moves each condition: that of its block, or of its rest."""
+        return self.rests if source in _OF_REST else np.arange(len(self.rests))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scatter:
-    """Variances (4,) of the sources of `Sensitivity` [N², N²m², N², rad²] and their covariance (4, 4).
+    """Variances (7,) of the sources of `Sensitivity` [N², N²m², N², rad², N², N²m², rad²], covariance (7, 7).
 
     ``directions`` has the sensitivities of each direction by its load and rotation.
     """
@@ -72,10 +85,17 @@ class Scatter:
         return np.asarray(self.variances @ sensitivity.by_channel[channel] ** 2)
 
     def _squares(self, direction: Direction, weights: Mapping[Channel, Array]) -> Array:
-        # One error of a block moves both channels: their weighted sensitivities add before they are squared.
+        # What one error moves, in both channels, adds before it is squared.
         sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
-        moved = sum(sensitivity.by_channel[channel] * w for channel, w in weights.items())
-        return np.asarray(np.sum(np.square(moved), axis=1))
+        moved = np.sum([sensitivity.by_channel[channel] * w for channel, w in weights.items()], axis=0)
+        return np.array([
+            np.sum(np.bincount(sensitivity.errors(source), row) ** 2) for source, row in enumerate(moved)
+        ])  # fmt: skip
+
+
+def of_one_block(variances: Array) -> Array:
+    """Return the variances of FY [N²], MZ [N²m²], load [N²] and slip angle [rad²] of one block (4,)."""
+    return np.asarray(variances[:4] + np.array([variances[4], variances[5], 0.0, variances[6]]))
 
 
 def weights_of(direction: Direction, channel: Channel) -> Array:
@@ -96,24 +116,26 @@ def scatter_of(directions: Sequence[Direction], *, expected: Array | None = None
 
     Parameters
     ----------
-    expected : variances of the sources (4,) of a test that is yet to be made: what it will say of them, on
+    expected : variances of the sources (7,) of a test that is yet to be made: what it will say of them, on
         average, in place of what the residuals say
     """
     sensitivities = _sensitivities(directions)
     scale = _scale(directions, sensitivities)
-    curves = [
-        _Residuals.of(direction, sensitivities[direction.group.load_N, direction.group.rotation], scale)
-        for direction in directions
-        if direction.fit.FY is not None or direction.fit.MZ is not None
+    together = [
+        [d for d in directions if d.group.rotation == rotation and (d.fit.FY or d.fit.MZ)]
+        for rotation in ROTATIONS
     ]
+    curves = [_Residuals.of(mine, sensitivities, scale) for mine in together if mine]
     if expected is not None:
         curves = [curve.expecting(expected / scale**2) for curve in curves]
     freedoms = sum(len(curve.rows) for curve in curves)
-    free = np.array([True, True, freedoms >= _ENOUGH, freedoms >= _ENOUGH])
-    free &= np.array([
-        any(float(np.trace(curve.parts[k])) > _SETTLED * len(curve.rows) for curve in curves)
-        for k in range(4)
-    ]) if curves else False  # fmt: skip
+    conditions = [c for d in directions for c in sensitivities[d.group.load_N, d.group.rotation].rests]
+    shared = len(set(conditions)) < len(conditions)
+    free = np.array([
+        (shared or source not in _OF_REST) and (source in _CHANNEL or freedoms >= _ENOUGH)
+        and any(float(np.trace(curve.parts[source])) > _SETTLED * len(curve.rows) for curve in curves)
+        for source in range(_SOURCES)
+    ])  # fmt: skip
     variances, covariance = _restricted(curves, free)
     return Scatter(
         variances=variances * scale**2,
@@ -128,8 +150,10 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
     ]
     groups = at_one_angle([direction.group.conditions[place] for direction, place in every])
     by_load: dict[Channel, dict[tuple[int, int], float]] = {channel: {} for channel in CHANNELS}
-    for members in groups:
+    rest: dict[tuple[int, int], int] = {}
+    for number, members in enumerate(groups):
         pairs = [every[index] for index in members]
+        rest |= {(id(direction), place): number for direction, place in pairs}
         FZ = np.array([direction.group.conditions[place].FZ for direction, place in pairs])
         for channel in CHANNELS:
             y = np.array([direction.group.values(channel)[place] for direction, place in pairs])
@@ -142,12 +166,14 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
         rows: dict[Channel, Array] = {}
         for index, channel in enumerate(CHANNELS):
             fit = direction.curve(channel)
-            moved = np.zeros((4, len(SA)))
-            moved[index] = 1.0
+            moved = np.zeros((_SOURCES, len(SA)))
+            moved[index] = moved[4 + index] = 1.0
             moved[2] = [by_load[channel][id(direction), place] for place in range(len(SA))]
-            moved[3] = 0.0 if fit is None else slope_at(fit, SA)
+            moved[3] = moved[6] = 0.0 if fit is None else slope_at(fit, SA)
             rows[channel] = moved
-        sensitivities[direction.group.load_N, direction.group.rotation] = Sensitivity(by_channel=rows)
+        sensitivities[direction.group.load_N, direction.group.rotation] = Sensitivity(
+            by_channel=rows, rests=np.array([rest[id(direction), place] for place in range(len(SA))])
+        )
     return sensitivities
 
 
@@ -166,50 +192,60 @@ def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, 
         )
         for k in (2, 3)
     ]
-    return np.array([*size, *(size[0] / slope if slope else 1.0 for slope in steep)])
+    load, angle = (size[0] / slope if slope else 1.0 for slope in steep)
+    return np.array([*size, load, angle, *size, angle])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Residuals:
-    # Of one direction, in the space that its curves leave: residuals (f,), what its rows and the way to the
-    # common load explain (f, f), and what each source would (4, f, f); values in parts of max|y|. Of a test
+    # Of one rotation, in the space that its curves leave: residuals (f,), what its rows and the way to the
+    # common load explain (f, f), and what each source would (7, f, f); values in parts of max|y|. Of a test
     # that is yet to be made the columns of z are those of a root of the residuals' covariance.
     z: tuple[Array, ...]
     rows: Array
     parts: Array
 
     @classmethod
-    def of(cls, direction: Direction, sensitivity: Sensitivity, scale: Array) -> _Residuals:
-        """Project the residuals of both channels out of their curves' tangent planes."""
-        SA = direction.group.SA
-        n = len(SA)
-        spaces, residuals, variances, moved = [], [], [], []
-        for index, channel in enumerate(CHANNELS):
-            fit = direction.curve(channel)
-            if fit is None:
-                continue
-            jacobian = model(fit.model).jacobian(fit.values, SA)
-            hat = jacobian.T @ weights_of(direction, channel)
-            values, vectors = np.linalg.eigh((hat + hat.T) / 2)
-            spaces.append(vectors[:, values < 0.5].T)
-            y = direction.group.values(channel)
-            residuals.append((y - value_at(fit, SA)) / scale[index])
-            variances.append((direction.group.own_u(channel) / scale[index]) ** 2 + _FLOOR)
-            moved.append(sensitivity.by_channel[channel] * scale[:, None] / scale[index])
-        count = len(spaces)
-        K = np.zeros((sum(len(part) for part in spaces), count * n))
-        row = 0
-        for place, part in enumerate(spaces):
-            K[row : row + len(part), place * n : (place + 1) * n] = part
-            row += len(part)
-        # Each source is one variable a condition: FY and MZ of a block share it.
-        parts = []
-        for k in range(4):
-            columns = np.vstack([np.diag(sources[k]) for sources in moved])
-            through = K @ columns
-            parts.append(through @ through.T)
-        rows = (K * np.concatenate(variances)) @ K.T
-        return cls(z=(K @ np.concatenate(residuals),), rows=rows, parts=np.array(parts))
+    def of(
+        cls,
+        directions: Sequence[Direction],
+        sensitivities: Mapping[tuple[float, str], Sensitivity],
+        scale: Array,
+    ) -> _Residuals:
+        """Project the residuals of both channels of all loads out of their curves' tangent planes."""
+        from scipy.linalg import block_diag
+
+        residuals, rows = [], []
+        moved: list[list[Array]] = [[] for _ in range(_SOURCES)]  # of each curve (its freedoms, errors)
+        errors = 1 + max(int(sensitivities[d.group.load_N, d.group.rotation].rests.max()) for d in directions)
+        blocks = sum(len(d.group.conditions) for d in directions)
+        first = 0
+        for direction in directions:
+            SA = direction.group.SA
+            sensitivity = sensitivities[direction.group.load_N, direction.group.rotation]
+            for index, channel in enumerate(CHANNELS):
+                fit = direction.curve(channel)
+                if fit is None:
+                    continue
+                jacobian = model(fit.model).jacobian(fit.values, SA)
+                hat = jacobian.T @ weights_of(direction, channel)
+                values, vectors = np.linalg.eigh((hat + hat.T) / 2)
+                space = vectors[:, values < 0.5].T
+                y = direction.group.values(channel)
+                residuals.append(space @ (y - value_at(fit, SA)) / scale[index])
+                own = (direction.group.own_u(channel) / scale[index]) ** 2 + _FLOOR
+                rows.append((space * own) @ space.T)
+                for source in range(_SOURCES):
+                    of_rest = source in _OF_REST
+                    number = sensitivity.errors(source) + (0 if of_rest else first)
+                    through = np.zeros((errors if of_rest else blocks, len(space)))
+                    part = sensitivity.by_channel[channel][source] * scale[source] / scale[index]
+                    np.add.at(through, number, (space * part).T)
+                    moved[source].append(through.T)
+            first += len(SA)
+        stacked = [np.vstack(curves) for curves in moved]
+        parts = np.array([through @ through.T for through in stacked])
+        return cls(z=(np.concatenate(residuals),), rows=block_diag(*rows), parts=parts)
 
     def expecting(self, variances: Array) -> _Residuals:
         """Return what the residuals are on average where the sources have these variances."""
@@ -218,10 +254,10 @@ class _Residuals:
 
 
 def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the variances of the largest restricted likelihood (4,) and their covariance (4, 4)."""
+    """Return the variances of the largest restricted likelihood (7,) and their covariance (7, 7)."""
     from scipy.optimize import nnls
 
-    variances, covariance = np.zeros(4), np.zeros((4, 4))
+    variances, covariance = np.zeros(_SOURCES), np.zeros((_SOURCES, _SOURCES))
     places = np.flatnonzero(free)
     if not len(curves) or not len(places):
         return variances, covariance

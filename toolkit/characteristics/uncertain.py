@@ -19,13 +19,16 @@ from toolkit.estimate import Estimate, effective_dof
 class Part:
     """One variable's signed share ``u`` of a standard uncertainty, in the unit of the value.
 
-    ``source`` is the line of the budget that it belongs to; ``dof`` its degrees of freedom.
+    ``source`` is the line of the budget that it belongs to; ``dof`` its degrees of freedom. Parts of one
+    ``pool`` are independent variables whose sizes rest on one estimate of variance: what makes the estimate
+    too small makes all of them too small, and their degrees of freedom do not add up.
     """
 
     source: str
     key: str
     u: float
     dof: float = math.inf
+    pool: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +51,7 @@ class Uncertain:
     def estimate(self) -> Estimate:
         """Return value, standard uncertainty and effective degrees of freedom (GUM G.4.1)."""
         u = math.sqrt(sum(part.u * part.u for part in self.parts))
-        dof = effective_dof([(part.u, part.dof) for part in self.parts]) if u else math.inf
+        dof = effective_dof(_estimates(self.parts)) if u else math.inf
         return Estimate(value=self.value, u=u, unit=self.unit, dof=dof)
 
     def scaled(self, factor: float, unit: str) -> Uncertain:
@@ -71,6 +74,23 @@ class Uncertain:
         return tuple((source, math.sqrt(square)) for source, square in squares.items())
 
 
+def _estimates(parts: Iterable[Part]) -> list[tuple[float, float]]:
+    """Return u and degrees of freedom of every estimate of variance.
+
+    Variances of one estimate are fully correlated: the standard deviation of their sum, u^2 sqrt(2/dof) of
+    each, is the sum of theirs.
+    """
+    pools: dict[str, list[Part]] = {}
+    for part in parts:
+        pools.setdefault(part.pool or part.key, []).append(part)
+    estimates = []
+    for pool in pools.values():
+        variance = sum(part.u**2 for part in pool)
+        spread = sum(part.u**2 / math.sqrt(part.dof) for part in pool)
+        estimates.append((math.sqrt(variance), (variance / spread) ** 2 if spread else math.inf))
+    return estimates
+
+
 def merged(parts: Iterable[Part]) -> tuple[Part, ...]:
     """Return parts with one entry a key, their signed shares added; those that vanish are left out."""
     return _merged((1.0, part) for part in parts)
@@ -87,7 +107,7 @@ def _merged(weighted_parts: Iterable[tuple[float, Part]]) -> tuple[Part, ...]:
         else:
             first[key], shares[key] = part, share
     return tuple(
-        Part(source=first[key].source, key=key, u=share, dof=first[key].dof)
+        Part(source=first[key].source, key=key, u=share, dof=first[key].dof, pool=first[key].pool)
         for key, share in shares.items()
         if share
     )

@@ -182,7 +182,7 @@ class EarlierTest:
         loads = {direction.group.load_N for direction in directions}
         if len(loads) == 1:
             # One load alone gives no slope to carry a block by: how far it stands off is scatter.
-            variances = variances + np.array([0.0, 0.0, (self.load_spread * loads.pop()) ** 2, 0.0])
+            variances = variances + (self.load_spread * loads.pop()) ** 2 * (np.arange(len(variances)) == 2)
         return scatter_of(directions, expected=variances)
 
     def foreseen(self, design: Design, *, shift: float = 0.0) -> tuple[tuple[Direction, ...], Scatter]:

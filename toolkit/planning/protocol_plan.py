@@ -10,6 +10,7 @@ from datetime import date
 from typing import Annotated, Any
 
 from toolkit.channels import Rotation
+from toolkit.characteristics.scatter import of_one_block
 from toolkit.declared import Entry, toml_text
 from toolkit.machine import Machine, Protocol
 from toolkit.planning.demands import Demand, PrintedUnits, Reach, units_of
@@ -262,12 +263,14 @@ def _key(reach: Reach) -> tuple[str, str, float]:
 def _assumptions(
     earlier: EarlierTest, others: Sequence[EarlierTest], tread: Tread, units: PrintedUnits
 ) -> tuple[str, ...]:
+    variances = of_one_block(earlier.variances)
+
     def scatter(place: int, unit: str) -> str:
-        size, printed = units.shown(math.sqrt(earlier.variances[place]), unit)
+        size, printed = units.shown(math.sqrt(variances[place]), unit)
         return f"{size:.2g} {printed.replace('*', '·')}"
 
     pace = tread.pace
-    angle = math.degrees(math.sqrt(earlier.variances[3]))
+    angle = math.degrees(math.sqrt(variances[3]))
     statements = [
         "the tire is like that of the earlier test: its curves say where the slip angles are needed"
         if not others

@@ -71,6 +71,18 @@ def shown_profile(columns: Mapping[str, Array], residuals: Array) -> Array | Non
     return None if profile is None else np.asarray(np.sqrt(profile.at(columns)))
 
 
+def relative_profile(columns: Mapping[str, Array], residuals: Array, leverage: Array) -> Profile | None:
+    """Return how the scatter of a plain fit grows, by its residual variance; None where it shows none.
+
+    A residual has 1 - h of its row's variance (``leverage`` h, (rows,)): rows of large loads draw the
+    equation to themselves, and are the ones that scatter most (MacKinnon and White, J. Econometrics 29 (1985)
+    305, HC2).
+    """
+    remaining = np.maximum(1 - leverage, _SMALLEST)
+    size = float(np.sqrt(residuals @ residuals / remaining.sum()))
+    return profile_of_residuals(columns, residuals / np.sqrt(remaining) / size) if size > 0 else None
+
+
 def profile_of_residuals(columns: Mapping[str, Array], residuals: Array) -> Profile | None:
     """Return how the scatter grows where residuals (rows,) show that it does; else None.
 

@@ -3,7 +3,7 @@
 Every method makes its coefficients by a linear map A of the reference loads, so that one model of scatter
 (`records.scatter`) serves them all: only A and what is stated of the rows differ.
 
-    ols         A = (X'X)^-1 X'          rows alike, nothing stated
+    ols         A = (X'X)^-1 X'          nothing stated: rows alike, or as residuals show (`profile`)
     wls, odr    A = (X'WX)^-1 X'W        W = 1 / u^2; of odr u^2 = u_load^2 + sum of (slope_j u_j)^2 and X at
                                          the adjusted indications
     gls         A = (X'V^-1 X)^-1 X'V^-1 V with the error that a group of rows shares (`known_errors`)
@@ -21,12 +21,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.arrays import Array
+from toolkit.calibration.fit.profile import Profile, relative_profile
 from toolkit.calibration.records.scatter import WEIGHTED, Rows, RunScatter, chi2_limit, rows_of
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
 from toolkit.calibration.terms import term_matrix, term_slopes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -215,6 +216,17 @@ def weighed_rows(
         stated=(stated[0], stated[1], stated[2]), shared=shared,
         rounded=None if rounding is None else rounding.covariance(operator),
     )  # fmt: skip
+
+
+def shown_rows(
+    rows: Rows, design: Array, columns: Mapping[str, Array], residuals: Array
+) -> tuple[Rows, Profile | None]:
+    """Return the rows of a plain fit with the noise that residuals within runs show, and its profile.
+
+    Where they show that all rows scatter alike, the rows are the same and the profile is None.
+    """
+    profile = relative_profile(columns, residuals, np.einsum("ij,ji->i", design, rows.operator))
+    return (rows if profile is None else replace(rows, noise=np.sqrt(profile.at(columns)))), profile
 
 
 def scatter_of_one(noise: RowNoise, residuals: Array, factor: str, dof: int) -> RunScatter | None:

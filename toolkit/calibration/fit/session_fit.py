@@ -24,9 +24,9 @@ from toolkit.calibration.fit.regression import (
     raw_coefficients,
 )
 from toolkit.calibration.fit.rounding import Rounding, with_steps
-from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
+from toolkit.calibration.fit.row_noise import RowNoise, noise_of, shown_rows, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
-from toolkit.calibration.fit.session_scatter import FittedRows, scatter_of_rows
+from toolkit.calibration.fit.session_scatter import FittedRows, scatter_as_shown, scatter_of_rows
 from toolkit.calibration.records.record import ROUNDING
 from toolkit.calibration.records.scatter import RunScatter
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors, row_uncertainty
@@ -216,30 +216,34 @@ def _result(
         session.method, session_statements(session), table, setting.name, terms=fit.terms,
         coefficients=fit.coefficients, indications=session.indications, where=session.path,
     )  # fmt: skip
-    scatter = scatter_of_rows(
-        FittedRows(
-            design=design, load=load, table=table, zero=session.zero, noise=noise, residuals=fit.residuals,
-            residual_sd=fit.residual_sd, dof=fit.dof,
-            between=session_statements(session).between(setting.name),
-        )
+    exact = rounding_alone(fit, table.columns(session.indications), load, setting.tolerance)
+    fitted_rows = FittedRows(
+        design=design, load=load, table=table, zero=session.zero, noise=noise, residuals=fit.residuals,
+        residual_sd=fit.residual_sd, dof=fit.dof,
+        between=session_statements(session).between(setting.name),
     )  # fmt: skip
+    scatter = scatter_of_rows(fitted_rows)
     rounding = Rounding.of(
         session_statements(session), table.columns(session.indications), terms=fit.terms,
         coefficients=fit.coefficients,
     )  # fmt: skip
-    of_runs = np.zeros_like(load)
-    if scatter is not None or rounding is not None:
-        rows = weighed_rows(design, load, groups_of(table, session.zero)[1], noise, rounding=rounding)
-        of_runs = of_runs if scatter is None else rows.of_runs(scatter, fit.residuals)
-        alone = fit.covariance if rows.rounded is None else fit.covariance + rows.rounded
-        fit = dataclasses.replace(fit, covariance=alone if scatter is None else rows.covariance(scatter))
-    exact = rounding_alone(fit, table.columns(session.indications), load, setting.tolerance)
-    residuals, percent = None, None
+    rows = weighed_rows(design, load, groups_of(table, session.zero)[1], noise, rounding=rounding)
+    of_runs = np.zeros_like(load) if scatter is None else rows.of_runs(scatter, fit.residuals)
+    if noise is None and not exact:
+        # By the residuals as a record's refit has them, from the coefficients alone.
+        residuals = load - design @ np.asarray(fit.coefficients)
+        unlike, profile = shown_rows(rows, design, table.columns(session.indications), residuals - of_runs)
+        shown = None if profile is None else scatter_as_shown(scatter, fitted_rows)
+        if shown is not None:
+            scatter, rows = shown, unlike
+    alone = fit.covariance if rows.rounded is None else fit.covariance + rows.rounded
+    fit = dataclasses.replace(fit, covariance=alone if scatter is None else rows.covariance(scatter))
+    check_residuals, percent = None, None
     if session.check is not None:
         check = session.check
         fitted = term_matrix(session.terms, check.columns(session.indications)) @ np.asarray(fit.coefficients)
-        residuals = fitted - check.column(setting.name)
-        percent = 100 * float(np.abs(residuals).max()) / float(np.abs(load).max())
+        check_residuals = fitted - check.column(setting.name)
+        percent = 100 * float(np.abs(check_residuals).max()) / float(np.abs(load).max())
     return LoadResult(
         setting=setting,
         fit=fit,
@@ -253,7 +257,7 @@ def _result(
             fit, of_runs, noise, cells=cells, load=load, up=table.up, groups=groups, exact=exact
         ),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
-        check_residuals=residuals,
+        check_residuals=check_residuals,
         check_max_percent_fs=percent,
     )
 

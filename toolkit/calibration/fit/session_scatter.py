@@ -5,7 +5,7 @@ Fit and refit come here, so that what a record stores is held against what its o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +14,9 @@ from toolkit.arrays import Array
 from toolkit.calibration.fit.row_noise import RowNoise, scatter_of_one
 from toolkit.calibration.fit.run_scatter import estimate, is_lowest, stated_scatter, untold_scatter
 from toolkit.calibration.fit.session_rows import SessionRows, are_untold, groups_of
+from toolkit.calibration.records.scatter import MODEL, SHOWN, RunScatter
 
 if TYPE_CHECKING:
-    from toolkit.calibration.records.scatter import RunScatter
     from toolkit.calibration.session.statements import BetweenRuns
     from toolkit.calibration.session.table import Table
 
@@ -64,11 +64,26 @@ def scatter_of_rows(rows: FittedRows) -> RunScatter | None:
     return None if noise is None else scatter_of_one(noise, residuals, factor, dof)
 
 
+def scatter_as_shown(scatter: RunScatter | None, rows: FittedRows) -> RunScatter | None:
+    """Return the scatter of rows whose residuals show a profile; None where a model of its own holds them.
+
+    ``scatter`` is that of rows alike (`scatter_of_rows`).
+    """
+    if scatter is not None:
+        return replace(scatter, model=SHOWN) if scatter.model == MODEL else None
+    return RunScatter(
+        factor=groups_of(rows.table, rows.zero)[0], groups=1, within=rows.residual_sd, zero=0.0, gain=0.0,
+        correlation=0.0, dof=rows.dof, model=SHOWN,
+    )  # fmt: skip
+
+
 def is_of_rows(scatter: RunScatter, rows: FittedRows) -> bool:
     """Tell whether a stored scatter is the one that the rows have (see `scatter_of_rows`)."""
     if scatter.groups > 1:  # of runs of few rows, too, in records made before these counted as one
         return is_lowest(rows.session_rows(every=True), scatter)
     expected = scatter_of_rows(rows)
+    if scatter.model == SHOWN:
+        expected = scatter_as_shown(expected, rows)
     if expected is None or expected.groups > 1:
         return False
     if (scatter.factor, scatter.dof, scatter.model) != (expected.factor, expected.dof, expected.model):

@@ -7,11 +7,12 @@ Reference loads y of a session against its terms X:
 with a zero z_r ~ N(0, zero^2) and a gain g_r ~ N(0, gain^2) of every run, both in the unit of the load (the
 gain at the largest load), and e_i ~ N(0, (within s_i)^2), correlated with the row before it in its run by
 ``correlation``. s_i is 1 where all rows weigh alike, else the row's stated uncertainty by their root mean
-square. The coefficients are those of the session's fit, whatever its method, a linear map A of the loads
-(of errors in both variables: to first order, at the solution): their covariance is A V A^T with V that of
-the rows (JCGM 100:2008, 5.2; Searle, Casella and McCulloch, Variance
-Components, 1992). `fit.run_scatter` estimates the components; what is computed from them stands here, in
-numpy alone, because every command that loads a record computes it again.
+square, or what the residuals of a plain fit show of it (White, Econometrica 48 (1980) 817, by a profile in
+place of single squares). The coefficients are those of the session's fit, whatever its method, a linear map
+A of the loads (of errors in both variables: to first order, at the solution): their covariance is A V A^T
+with V that of the rows (JCGM 100:2008, 5.2; Searle, Casella and McCulloch, Variance Components, 1992).
+`fit.run_scatter` estimates the components; what is computed from them stands here, in numpy alone, because
+every command that loads a record computes it again.
 
 What a session states of its rows stands in V in place of what they show, unless chi-square contradicts it
 at 95 % (ISO/TS 28037:2010, 6.2.2): then what they show takes its place, as the scale factor of weighted means
@@ -31,9 +32,10 @@ from toolkit.estimate import coverage_factor
 
 MODEL = "run-effects-1"
 WEIGHTED = "weighted-run-effects-1"  # rows of unlike stated uncertainty, and what is stated as a floor
+SHOWN = "shown-run-effects-1"  # rows of a plain fit whose residuals show that they scatter unlike
 UNTOLD = "untold-runs-1"  # runs of so few rows that nothing tells their effects from noise
 UNTOLD_DOF = 2.0  # as three runs tell, the fewest that ASTM E74 accepts
-MODELS = (MODEL, WEIGHTED, UNTOLD)
+MODELS = (MODEL, WEIGHTED, SHOWN, UNTOLD)
 _NEGLIGIBLE = 1e-18
 _STEP = 1e-4
 _NORMAL_95 = 1.6448536269514722

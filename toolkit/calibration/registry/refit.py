@@ -20,10 +20,11 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.calibration.fit.rounding import rounding_of
-from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
+from toolkit.calibration.fit.row_noise import RowNoise, noise_of, shown_rows, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, is_of_rows
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+from toolkit.calibration.records.scatter import SHOWN
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
@@ -320,7 +321,13 @@ def scatter_covariance(
         return None
     group = groups_of(table, record.zero, every=fit.scatter.groups > 1)[1]
     rounding = rounding_of(record, fit, table)
-    return weighed_rows(design, load, group, noise, operator, rounding).covariance(fit.scatter)
+    weighed = weighed_rows(design, load, group, noise, operator, rounding)
+    if fit.scatter.model == SHOWN:
+        within = rows.residuals - weighed.of_runs(fit.scatter, rows.residuals)
+        weighed, profile = shown_rows(weighed, design, table.columns(record.indications), within)
+        if profile is None:
+            return None
+    return weighed.covariance(fit.scatter)
 
 
 def row_noise(record: CalibrationRecord, fit: LoadFit, table: Table) -> RowNoise | None:

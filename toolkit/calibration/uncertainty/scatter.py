@@ -10,18 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.calibration.fit.profile import Profile, profile_of_residuals
+from toolkit.calibration.fit.profile import Profile
 from toolkit.calibration.fit.rounding import rounding_of
-from toolkit.calibration.fit.row_noise import RowNoise, noise_of, weighed_rows
+from toolkit.calibration.fit.row_noise import RowNoise, noise_of, shown_rows, weighed_rows
 from toolkit.calibration.fit.run_scatter import estimate, spread
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-from toolkit.calibration.records.scatter import UNTOLD, UNTOLD_DOF, Rows, RunScatter
+from toolkit.calibration.records.scatter import SHOWN, UNTOLD, UNTOLD_DOF, Rows, RunScatter
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
@@ -77,6 +77,8 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
         design, load, loads, record.zero, noise=None if noise is None else noise.profile, every=every
     )
     runs = fitted.scatter or estimate(rows) or _one_run(rows)
+    if runs.model == SHOWN and runs.groups < 2 and not (runs.zero or runs.gain):
+        runs = replace(_one_run(rows), model=SHOWN)  # what a smooth curve leaves, as of rows alike
     if runs.groups > 1:
         covariance = spread(rows, runs)
     else:
@@ -92,12 +94,19 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
         rounding=rounding_of(record, fitted, loads),
     )
     residuals = load - design @ np.asarray(fitted.coefficients)
-    residuals = residuals - weighed.of_runs(runs, residuals)
+    unlike, profile = (
+        shown_rows(
+            weighed, design, loads.columns(record.indications), residuals - weighed.of_runs(runs, residuals)
+        )
+        if noise is None
+        else (weighed, _profile(record, loads, noise))
+    )
     return Scatter(
         runs=runs,
         spread=covariance,
-        rows=weighed,
-        profile=_shown(record, loads, residuals) if noise is None else _profile(record, loads, noise),
+        # Coefficients have the covariance that the record names; a reading to come has what the rows show.
+        rows=unlike if runs.model == SHOWN else weighed,
+        profile=profile,
         misfit=misfit[0],
         misfit_dof=misfit[1],
         reversal=reversal[0],
@@ -108,12 +117,6 @@ def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scat
 def _profile(record: CalibrationRecord, loads: Table, noise: RowNoise) -> Profile:
     squares = noise.profile**2
     return Profile.of(loads.columns(record.indications), squares, float(squares.min()))
-
-
-def _shown(record: CalibrationRecord, loads: Table, residuals: Array) -> Profile | None:
-    """Return the profile that residuals show, of mean one as the scatter within runs is that of all rows."""
-    size = float(np.sqrt(np.mean(residuals**2))) or 1.0
-    return profile_of_residuals(loads.columns(record.indications), residuals / size)
 
 
 def _one_run(rows: SessionRows) -> RunScatter:
