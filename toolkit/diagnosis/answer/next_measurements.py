@@ -14,12 +14,12 @@ from toolkit.diagnosis.policy import LOCATION, PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import beyond_noise
+from toolkit.diagnosis.search.unexplained import answered_input
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit, with_unit
 
 if TYPE_CHECKING:
-    from toolkit.arrays import Array
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.unexplained import Line
 
@@ -241,7 +241,7 @@ def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
     for line in lines:
-        order, answered = _order(problem, line.frequency), _answered(problem, line)
+        order, answered = _order(problem, line.frequency), answered_input(problem, line)
         if order is None and answered is not None:
             name, multiple = answered
             times = "as fast" if multiple == 1 else f"{multiple} times as fast"
@@ -261,35 +261,6 @@ def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str
         listed = " and ".join(unturned)
         sentences.append(f"{subject} swings at {listed}: record what turns or swings at this frequency.")
     return sentences
-
-
-def _answered(problem: Problem, line: Line) -> tuple[str, int] | None:
-    """Return the recorded input whose own swing has a line [Hz] among its multiples, and which it is.
-
-    What is bent answers to a swing by its multiples, and nothing else has to turn there.
-    """
-    for channel in problem.case.drivers:
-        multiples = [_multiple(line, run.t, run.columns.get(channel.name)) for run in problem.runs]
-        if multiples and None not in multiples and len(set(multiples)) == 1:
-            return channel.name, int(multiples[0] or 0)
-    return None
-
-
-def _multiple(line: Line, t: Array, values: Array | None) -> int | None:
-    """Return which multiple of a column's own swing a line is in one run; None where it has none so clear."""
-    if values is None or len(t) < STRUCTURE.line_rows or not np.isfinite(values).all():
-        return None
-    even = np.interp(np.linspace(t[0], t[-1], len(t)), t, values)
-    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(t)))) ** 2
-    k = int(np.argmax(power))
-    if k < STRUCTURE.line_cycles or power[k - 1 : k + 2].sum() < STRUCTURE.swings * power.sum():
-        return None
-    width = 1 / float(t[-1] - t[0])
-    multiple = round(line.frequency / (k * width))
-    unsure = multiple * width / 2 + line.width / 2
-    near = abs(line.frequency - multiple * k * width) <= unsure
-    # Among so wide multiples any line would be.
-    return multiple if near and multiple and unsure < STRUCTURE.order_cycles * k * width else None
 
 
 def _order(problem: Problem, frequency: float) -> tuple[str, float] | None:

@@ -37,6 +37,7 @@ from toolkit.diagnosis.policy import LAWS, STRUCTURE
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.unexplained import (
     Line,
+    answered_input,
     beyond_its_past,
     narrowest_line,
     strongest_events,
@@ -261,9 +262,11 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
             for shape in TWO:
                 yield from started(problem, shape, pair, "adds", output)
         line = strongest_line(problem, output, base.residual[output])
-        if line is not None:
+        # What answers to an input's own swing is bent or changes with time: no tone foretells another swing.
+        if line is not None and answered_input(problem, line) is None:
             yield trial_at(problem, TONE, signals[-1:], "adds", output, {"frequency": line.frequency})
             yield from _locked(problem, base, output, line, signals[-1])
+        if line is not None:
             for signal, start in itertools.product(signals[:-1], rung(line.frequency)):
                 yield trial_at(problem, MODE, (signal,), "adds", output, start)
         yield from _events(problem, base, output)
@@ -299,6 +302,8 @@ def unlocked_tone(problem: Problem, base: Fit, output: str) -> Trial | None:
     """
     line = narrowest_line(problem, output, base.residual[output])
     if line is None or line.p_value >= STRUCTURE.line or line.share <= STRUCTURE.line_share:
+        return None
+    if not line.angle and answered_input(problem, line) is not None:
         return None
     if beyond_its_past(problem, output, base.residual[output], line) >= STRUCTURE.line:
         return None

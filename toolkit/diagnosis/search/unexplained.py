@@ -89,6 +89,42 @@ def turns_of(problem: Problem, channel: CaseChannel) -> list[Array] | None:
     return turns
 
 
+def answered_input(problem: Problem, line: Line) -> tuple[str, int] | None:
+    """Return the recorded input whose own swing has a line [Hz] among its multiples, and which it is.
+
+    What is bent answers to a swing by its multiples, and nothing else has to turn there.
+    """
+    for channel in problem.case.drivers:
+        multiples = [_multiple(line, run.t, run.columns.get(channel.name)) for run in problem.runs]
+        if multiples and None not in multiples and len(set(multiples)) == 1:
+            return channel.name, int(multiples[0] or 0)
+    return None
+
+
+def _multiple(line: Line, t: Array, values: Array | None) -> int | None:
+    """Return which multiple of a column's own swing a line is in one run; None where it has none so clear."""
+    if values is None or len(t) < STRUCTURE.line_rows or not np.isfinite(values).all():
+        return None
+    even = np.interp(np.linspace(t[0], t[-1], len(t)), t, values)
+    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(t)))) ** 2
+    k = int(np.argmax(power))
+    if not STRUCTURE.line_cycles <= k < len(power) - 1:
+        return None
+    around = power[k - 1 : k + 2]
+    if around.sum() < STRUCTURE.swings * power.sum():
+        return None
+    width = 1 / float(t[-1] - t[0])
+    below, at, above = np.log(np.maximum(around, 1e-300))
+    own = (
+        k + 0.5 * (below - above) / min(below - 2 * at + above, -1e-12)
+    ) * width  # where a parabola is highest
+    multiple = round(line.frequency / own)
+    unsure = (multiple * width + line.width) / 2
+    near = abs(line.frequency - multiple * own) <= unsure
+    # Among so wide multiples any line would be.
+    return multiple if near and multiple and unsure < STRUCTURE.order_cycles * own else None
+
+
 def strongest_line(
     problem: Problem,
     name: str,
