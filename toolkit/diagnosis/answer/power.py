@@ -9,6 +9,7 @@ import numpy as np
 
 from toolkit.diagnosis.answer.answer import AbsentEffect, cut_short
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.search.candidates import is_refuted
 from toolkit.diagnosis.search.noise_floor import is_beyond_noise
 from toolkit.effects.catalogue import effects
 
@@ -23,6 +24,7 @@ NO_TIME = "it takes time, and the recording has none"
 NO_SIZE = "it is there or not: it has no size"
 NO_ORDER = "it remembers its way, and the rows have no order"
 NO_STEPS = "the values stand on no steps coarser than their last digits that matter beside what is left"
+REFUTED = "the recording has values that it cannot show"
 NOT_TRIED = "it has a place in this case, and the last step of the search left it out"
 OUTWEIGHED = "found, but what stays without a name outweighs it"
 GIVEN_UP = "found, and given up for what explains as much"
@@ -101,8 +103,11 @@ def _unscored(search: Search, name: str) -> str:
         return OUTWEIGHED
     if any(applied.effect.name == name for applied in search.screen.base.active):
         return GIVEN_UP
-    if not search.problem.model.places(effect):
+    places = search.problem.model.places(effect)
+    if not places:
         return NO_PLACE
+    if all(is_refuted(search.problem, effect, channel) for channel, _ in places):
+        return REFUTED
     if effect.in_time and not search.problem.case.has_time:
         return NO_TIME
     if effect.remembers and not search.problem.case.has_order:

@@ -151,7 +151,7 @@ def candidates(
             continue
         subsets = (None, *_subsets(problem, effect))
         for channel, source in problem.model.places(effect):
-            if _is_refuted(problem, effect, channel):
+            if is_refuted(problem, effect, channel):
                 continue
             on_inputs = effect.on_channel is not None and "input" in effect.on_channel.where
             of_many = effect.discrete and effect.parameters and channel not in problem.model.capability.cells
@@ -179,7 +179,7 @@ def candidates(
     )
 
 
-def _is_refuted(problem: Problem, effect: Effect, channel: str | None) -> bool:
+def is_refuted(problem: Problem, effect: Effect, channel: str | None) -> bool:
     """Tell whether an output was recorded where an effect of it cannot show it, by more than its noise.
 
     However well such an effect imitates something else: by rates alone, of which an angle that begins below
