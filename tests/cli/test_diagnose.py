@@ -66,7 +66,7 @@ def test_what_was_left_out_is_named_shown_and_predicted(run, tmp_path):
     assert set(place) == {"channel", "p_value", "share_of_variance", "where"}
     assert set(place["where"][0]) == {"variable", "from", "to", "unit", "runs"}
     assert [set(one) for one in made["nominal_parameters"]] == [
-        {"name", "before", "after", "unit", "prior_sd", "shift_in_sd"}
+        {"name", "before", "after", "with_laws", "unit", "prior_sd", "shift_in_sd"}
     ] * 2
     assert set(made["not_found"][0]) >= {"name", "minimum_detectable", "unit", "observable"}
     page = (tmp_path / "out" / "diagnosis.html").read_text(encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -117,6 +118,14 @@ def test_a_factor_over_a_covariate_is_learned_and_goes_into_the_model(tmp_path, 
     truth = 0.15 * np.exp(-(((np.array(law["curve"]["x"]) - 28) / 3) ** 2))
     inside = (np.array(band[0]) <= truth + 1e-4) & (truth - 1e-4 <= np.array(band[1]))
     assert inside.mean() > 0.8
+
+    # The mean of the factor had stood in the stiffness: beside the law it is that of the spring alone.
+    beside = {each["name"]: each["with_laws"] for each in answer["nominal_parameters"]}
+    model = tomllib.loads((tmp_path / "out/model.toml").read_text())["simulation"]["parameters"]
+    assert beside == {name: each["value"] for name, each in model.items()}
+    assert beside["k"] == pytest.approx(103, rel=0.005)
+    (alone,) = (each["after"] for each in answer["nominal_parameters"] if each["name"] == "k")
+    assert alone > 1.02 * beside["k"]
 
     # What the model file says of the same inputs is what the diagnosis predicts, and another tool reads both.
     assert answer["model"] == "model.toml"

@@ -228,6 +228,9 @@ class NominalParameter:
     after: OrNan
     unit: str
     prior_sd: float | None
+    with_laws: Annotated[
+        float | None, Entry("beside the laws, as in model.toml; null where none was fitted")
+    ] = None
 
     @property
     @derived("how far it moved, in its prior's standard deviation")

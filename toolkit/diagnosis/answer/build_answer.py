@@ -59,7 +59,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
             replace(effect, statement=f"Provisional, not all tests were made: {effect.statement}")
             for effect in effects
         )
-    nominal = _nominal(search, before_effects=unknown)
+    nominal = _nominal(search, laws, before_effects=unknown)
     left = bool(search.structure or laws.listed)
     verdict = _verdict(search, effects, nominal, unknown=unknown or left)
     # A search that did not come to its end has not shown that nothing is left.
@@ -291,9 +291,13 @@ def _named(active: AppliedEffect, runs: tuple[str, ...] | None) -> tuple[EffectE
     )
 
 
-def _nominal(search: Search, *, before_effects: bool) -> tuple[NominalParameter, ...]:
+def _nominal(search: Search, laws: Laws, *, before_effects: bool) -> tuple[NominalParameter, ...]:
     after = search.refitted if before_effects else search.augmented
-    fitted = dict(zip((parameter.name for parameter in search.problem.free), after.p, strict=True))
+    free = [parameter.name for parameter in search.problem.free]
+    fitted = dict(zip(free, after.p, strict=True))
+    active = {applied.key for applied in laws.fit.active}
+    beside = any(law.applied.key in active for law in laws.listed)
+    with_laws = dict(zip(free, laws.fit.p, strict=True)) if beside else {}
     return tuple(
         NominalParameter(
             name=parameter.name,
@@ -301,6 +305,7 @@ def _nominal(search: Search, *, before_effects: bool) -> tuple[NominalParameter,
             after=fitted.get(parameter.name, parameter.value),
             unit=parameter.unit,
             prior_sd=parameter.sd,
+            with_laws=with_laws.get(parameter.name),
         )
         for parameter in search.problem.model.parameters
     )

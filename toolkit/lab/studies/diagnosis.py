@@ -301,10 +301,17 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
         )
     moved = [parameter for parameter in diagnosis.nominal_parameters if parameter.prior_sd]
     if moved:
+        beside = ["with laws"] if any(o.with_laws is not None for o in moved) else []
         cells = [
-            [o.name, o.unit, f"{o.before:.5g}", f"{o.after:.5g}", f"{o.shift_in_sd or 0:+.1f}"] for o in moved
-        ]
-        lines += ["", table(["parameter", "unit", "before", "after", "shift/sd"], cells, align="<<>>>")]
+            [
+                o.name, o.unit, f"{o.before:.5g}", f"{o.after:.5g}",
+                *("" if o.with_laws is None else f"{o.with_laws:.5g}" for _ in beside),
+                f"{o.shift_in_sd or 0:+.1f}",
+            ]
+            for o in moved
+        ]  # fmt: skip
+        titles = ["parameter", "unit", "before", "after", *beside, "shift/sd"]
+        lines += ["", table(titles, cells, align="<<>>>" + ">" * len(beside))]
     lines += ["", *diagnosis.next_measurements] if diagnosis.next_measurements else []
     if not diagnosis.complete:
         lines += [

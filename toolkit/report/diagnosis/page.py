@@ -400,19 +400,22 @@ def _held_out(diagnosis: Diagnosis) -> Table:
 
 
 def _nominal_parameters(diagnosis: Diagnosis) -> Table:
+    listed = diagnosis.nominal_parameters
+    lawful = ("with the laws",) if any(each.with_laws is not None for each in listed) else ()
     rows = [
         (
             parameter.name,
             parameter.unit,
             f"{parameter.before:.6g}",
             f"{parameter.after:.6g}",
+            *("" if parameter.with_laws is None else f"{parameter.with_laws:.6g}" for _ in lawful),
             "known exactly" if parameter.prior_sd is None else f"{parameter.prior_sd:.3g}",
             "" if parameter.shift_in_sd is None else f"{parameter.shift_in_sd:+.2f}",
         )
-        for parameter in diagnosis.nominal_parameters
+        for parameter in listed
     ]
-    titles = ("parameter", "unit", "before", "after", "prior sd", "shift/sd")
-    return table(titles, rows, numbers=(2, 3, 4, 5))
+    titles = ("parameter", "unit", "before", "after", *lawful, "prior sd", "shift/sd")
+    return table(titles, rows, numbers=tuple(range(2, len(titles))))
 
 
 def _remaining(diagnosis: Diagnosis) -> Table:
