@@ -155,7 +155,7 @@ class _Averages:
     window: int = _set(256, "rows", "of a window of the spectra: five octaves and more")
     windows: int = _set(4, "windows side by side", "fewer are alike by chance")
     shortest: int = _set(16, "rows of a window", "three octaves: a shorter one tells no quick changes")
-    bent: float = _set(0.5, "of what is not followed", "stays where a bend is missing, as noise by any")
+    bent: float = _set(0.5, "of what is not followed", "stays where a bend is missing; noise stays by any")
     missed: float = _set(
         0.5, "of the mismatch", "smooth inputs that miss more drive another motion than the recorded one"
     )
@@ -454,9 +454,11 @@ class _Verdict:
     close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
     mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
     nearly: float = _set(
-        0.9, "of what is above the noise, squared", "effects that take it stay whatever the rest is"
+        0.9, "of the held-out mean square above the noise", "effects that take it stay, whatever the rest is"
     )
-    taken: float = _set(2 / 3, "of what is above the noise, squared", "named effects take, in one output")
+    taken: float = _set(
+        2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"
+    )
     accuracy: float = _set(
         0.01,
         "of an output's spread",

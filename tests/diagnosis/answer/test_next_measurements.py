@@ -41,14 +41,21 @@ def test_the_advice_is_about_what_the_mismatch_depends_on(variable, told):
     assert told in said
 
 
-def test_what_differs_from_run_to_run_as_a_recorded_level_does_is_looked_for_there():
+@pytest.mark.parametrize(
+    ("levels", "told"),
+    [
+        (("p",), "as p does: change p within a run"),
+        (("p", "T"), "as p and T do: change p and T within a run"),
+    ],
+)
+def test_what_differs_from_run_to_run_as_a_recorded_level_does_is_looked_for_there(levels, told):
     """A damper's gas at three pressures: three runs, and no other note of what changed between them."""
-    search = found("run", inputs=("v", "p"))
+    search = found("run", inputs=("v", *levels))
     for level in (345.0, 689.0, 1034.0):
-        columns = {"v": np.linspace(-1, 1, 50), "p": level + np.linspace(0, 2, 50)}
+        columns = {"v": np.linspace(-1, 1, 50)} | {name: level + np.linspace(0, 2, 50) for name in levels}
         search.problem.runs += (Of(columns=columns, rows=50),)
     (said,) = to_find_it(search)
-    assert "as p does: change p within a run" in said
+    assert told in said
 
 
 @pytest.mark.parametrize(

@@ -187,11 +187,12 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     if lines:
         sentences += _swinging(search.problem, lines, subject)
     if "run" in variables:
-        levels = " and ".join(_levels(search.problem))
+        standing = _levels(search.problem)
+        levels, do = " and ".join(standing), "does" if len(standing) == 1 else "do"
         sentences.append(
-            f"{subject} differs from run to run, as {levels} does: change {levels} within a run, or have "
-            "runs at more of its values, each twice."
-            if levels
+            f"{subject} differs from run to run, as {levels} {do}: change {levels} within a run, or have "
+            "runs at more values, each twice."
+            if standing
             else f"{subject} differs from run to run: repeat one run unchanged, and note what else changed."
         )
     if "time" in variables:
