@@ -127,7 +127,7 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
     return np.asarray(np.interp(t, even, (w**2 / (first - second) * answered).real))
 
 
-def _way(t: Array, x: Array) -> Array:
+def way(t: Array, x: Array) -> Array:
     """Return the integral of a signal over the time from the first row on: the way of a speed."""
     return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (x[1:] + x[:-1]))])
 
@@ -138,7 +138,7 @@ def _loop(_: Array, x: Array, reach: float) -> Array:
 
 
 _WITH_MEMORY: dict[str, Callable[..., Any]] = {
-    "lag": lag, "rate": _rate, "mode": _mode, "loop": _loop, "way": _way,
+    "lag": lag, "rate": _rate, "mode": _mode, "loop": _loop, "way": way,
 }  # fmt: skip
 
 

@@ -114,6 +114,8 @@ ONE: tuple[Shape, ...] = (
     _static("a*sign({x})", a="{y}"),
     _static("a*tanh(({x} - c)/s)", _bends, a="{y}", c="{x}", s="{x}"),
     _static("a*exp(-((({x} - c)/w)**2))", _bumps, a="{y}", c="{x}", w="{x}"),
+    # A latch: the slope of a bump of energy pushes back before it and pulls on behind it.
+    _static("a*({x} - c)*exp(-((({x} - c)/w)**2))", _bumps, a="{y}/{x}", c="{x}", w="{x}"),
     _static("a*exp({x}/d)", _growths, a="{y}", d="{x}"),
     _static(
         f"a1*sin({_TURN}*{{x}}/period) + a2*cos({_TURN}*{{x}}/period)", _periods, a1="{y}", a2="{y}",
