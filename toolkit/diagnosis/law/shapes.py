@@ -152,6 +152,15 @@ REMEMBERING: tuple[Shape, ...] = (
         about_zero=False,
     ),
 )  # fmt: skip
+BESIDE: tuple[Shape, ...] = (
+    REMEMBERING[0],
+    REMEMBERING[1],
+    Shape(
+        form="mode", text="a*({x} - mode({x}, frequency, damping))", starts=_modes, about_zero=False,
+        units={"a": "{y}/{x}", "frequency": "Hz", "damping": "1"},
+    ),
+)  # fmt: skip
+"""Shapes in the equation of a state: what follows a signal late, or swings beside it, and pulls at it."""
 TONE = Shape(
     form="tone", units={"a1": "{y}", "a2": "{y}", "frequency": "Hz"},
     text=f"a1*sin({_TURN}*frequency*[time]) + a2*cos({_TURN}*frequency*[time])",
