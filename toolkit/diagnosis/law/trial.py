@@ -162,12 +162,11 @@ def trial_at(
     values: dict[str, float] = {name: start.get(name, 0.0) for name in effect.names}
     if acts != "enters" and itself is not None:
         values |= conversion(ITSELF, unit(itself).factor, 0.0)
+    drivers = {driver.name for driver in case.drivers}
     for signal in signals if acts != "enters" else ():
-        if any(driver.name in signal.written for driver in case.drivers):
-            name = signal.written[signal.written.index("[") + 1 : signal.written.index("]")]
-            if name != ITSELF:
-                stated = unit(case.unit(name))
-                values |= conversion(name, stated.factor, stated.offset)
+        for name in drivers.intersection(formula(signal.written).signals):
+            stated = unit(case.unit(name))
+            values |= conversion(name, stated.factor, stated.offset)
     return Trial(
         unit=y,
         shape=shape, signals=signals, acts=acts,

@@ -36,9 +36,9 @@ def _read_otherwise(search: Search, step: Step) -> Step:
     behind = {
         rival.active.key: rival.active
         for rival in step.rivals
-        if rival.difference <= -VERDICT.close and _reads(rival.active) and _reads(step.active)
+        if rival.difference <= -VERDICT.close and rival.active.effect.reads_between_rows
     }
-    if not behind:
+    if not behind or not step.active.effect.reads_between_rows:
         return step
     beside = without(search.augmented.active, step.active)
     start = search.augmented.p
@@ -56,11 +56,6 @@ def _read_otherwise(search: Search, step: Step) -> Step:
         for rival in step.rivals
     )
     return replace(step, rivals=tuple(rivals))
-
-
-def _reads(applied: AppliedEffect) -> bool:
-    """Tell whether an effect shows what a channel did between two rows."""
-    return applied.effect.on_channel is not None and applied.effect.on_channel.between_rows
 
 
 def _readings(

@@ -246,8 +246,8 @@ class OdeModel:
             return through_channels(simulated, active, run, self.setting(run), run.columns)
         # An equation's outputs have a corner at each row, where its inputs have one.
         fine = [
-            replace(applied, values={**applied.values, STRAIGHT: 1.0}) if _between_rows(applied) else applied
-            for applied in active
+            replace(each, values={**each.values, STRAIGHT: 1.0}) if each.effect.reads_between_rows else each
+            for each in active
         ]
         finer = self.finer(run)
         shown = through_channels(simulated, fine, finer, self.setting(finer), finer.columns)
@@ -381,7 +381,7 @@ class OdeModel:
         forces = [
             applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
         ]
-        between = any(_between_rows(applied) and applied.acts_in(run) for applied in active)
+        between = any(applied.effect.reads_between_rows and applied.acts_in(run) for applied in active)
         return (run, between and run.rows > 1, tuple(p.values()), _forces_key(forces)), forces
 
     def integrated(
@@ -497,8 +497,3 @@ def _loaded(case: Case) -> OdeModel:
 
 def _forces_key(forces: Sequence[AppliedEffect]) -> tuple[Any, ...]:
     return tuple((force.effect.name, force.channel, tuple(force.values.values())) for force in forces)
-
-
-def _between_rows(applied: AppliedEffect) -> bool:
-    """Tell whether an effect shows what the equation did between two rows."""
-    return applied.effect.on_channel is not None and applied.effect.on_channel.between_rows
