@@ -97,6 +97,16 @@ if can_fork():
 
 remember_fits()
 
+
+def _flushed(handle: Any) -> None:
+    os.fstat(handle if isinstance(handle, int) else handle.fileno())
+
+
+# What is written is flushed to the disk before it is named, and tests of the registry write by the thousand: each
+# waited for the disk, which the other worker holds up too. No test sees whether bytes are on a disk or about to
+# be. `tests/crash` kills processes of their own, which flush, at each such call.
+os.fsync = _flushed
+
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
