@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from hashlib import blake2b
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.along_recordings import AlongRecordings
 from toolkit.diagnosis.simulators.array_table import ArrayTable, Trials
 from toolkit.diagnosis.simulators.channels import true_inputs
+from toolkit.diagnosis.simulators.memory import Memory
 from toolkit.diagnosis.simulators.tire import base_drive, late, through_tire, tire_signs
 from toolkit.diagnosis.simulators.user_code import load_functions, raised, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
     Answer = Callable[[Run, Mapping[str, float], Mapping[str, Array]], Arrays]
 
-_KEPT = 300  # simulations that are remembered
+_KEPT, _HELD = 600, 200_000_000  # simulations of a run that are remembered, and their bytes
 LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
 # Drive's field -> the channel that a simulator takes it from.
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
@@ -112,7 +114,7 @@ class PythonModel(AlongRecordings):
         self._called = answer
         self._names = {channel.name for channel in case.channels}
         self.inputs = frozenset(channel.name for channel in case.drivers if channel.role == "input")
-        self._kept: dict[tuple[Run, tuple[float, ...]], Arrays] = {}
+        self._kept: Memory[Arrays] = Memory(_KEPT, _HELD)
         self.capability = self.capability_with(unsure={}, findings=(), repeats=self._repeats)
 
     def own_outputs(
@@ -134,12 +136,9 @@ class PythonModel(AlongRecordings):
 
         The same inputs and parameters give the same outputs: a slow simulator is not asked twice.
         """
-        key = (run, tuple(p.values()))
-        if changed:
-            return self._called(run, p, changed)
+        inputs = tuple((name, blake2b(values.tobytes()).digest()) for name, values in changed.items())
+        key = (run, tuple(p.values()), inputs)
         if key not in self._kept:
-            if len(self._kept) >= _KEPT:
-                self._kept.pop(next(iter(self._kept)))
             self._kept[key] = self._called(run, p, changed)
         return self._kept[key]
 
