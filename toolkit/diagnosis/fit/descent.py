@@ -34,6 +34,7 @@ _TRIALS = 30
 _PROMISED = 1e-4  # of the log-likelihood, a seventieth of a standard deviation: no step is worth less
 _CREPT, _CREEPING = 4, 0.05  # trials, that together gain no more of the log-likelihood: it is rough there
 _ROUGH = 1.0  # of the log-likelihood, that is promised there: of more it is worth to look on
+_INSIDE = 0.9  # of the way to an effect's bound: where a wave has no size, none of its other values tells any
 _NO_WAY = 1e-5  # of a parameter's size: the step after it would be smaller by orders
 _POOR, _GOOD = 0.25, 0.75  # of what a step promised: the next may lead a part as far, or farther
 _DAMPING, _DAMPED = 1e-6, 4.0  # of the derivatives' square, and by as much more until a step is short enough
@@ -183,6 +184,7 @@ def descend(
     weighing = Weighing(space, layouts, noise, drifting)
     residual = weighing.cost(x)
     square, radius = 0.5 * float(residual @ residual), max(float(np.linalg.norm(x)), 1.0)
+    free = len(space.problem.free)
 
     def about(slopes: Stacked) -> Linear:
         linear = Linear.of(weighing.slope(slopes), residual)
@@ -202,6 +204,9 @@ def descend(
                 break
             linear, trials = about(derivatives.anew(x)), trials - 1
             continue
+        if promised > _ROUGH:
+            low[free:], high[free:] = _INSIDE * low[free:], _INSIDE * high[free:]
+            step, promised = linear.step(low, high)
         if np.linalg.norm(step) > radius:
             step, promised = linear.step(low, high, radius)
         there = np.clip(x + step, space.low, space.high)
