@@ -219,11 +219,20 @@ def _by_unseen_runs(
 def _fitted(
     problem: Problem, base: Fit, trials: Sequence[Trial], weight: float
 ) -> list[tuple[float, Trial, Fit]]:
-    """Return joint fits with their log-posterior less their parameters' cost, the best first."""
-    fitted = []
+    """Return joint fits with their log-posterior less their parameters' cost, the best first.
+
+    One that can neither be among those that are judged nor pass for as good as the best is not ended.
+    """
+    fitted: list[tuple[float, Trial, Fit]] = []
     for trial in trials:
-        refit = joint_fit(problem, base, (trial.applied,))
-        if refit is not None and not at_bound(refit.active[-1]):
+        scores = sorted(
+            score for score, other, _ in fitted if (other.form == "event") is (trial.form == "event")
+        )
+        least = -math.inf
+        if len(scores) >= LAWS.judged:
+            least = min(scores[-LAWS.judged], scores[-1] - VERDICT.close) + weight * trial.cost
+        refit = joint_fit(problem, base, (trial.applied,), least=least)
+        if refit is not None and refit.log_posterior >= least and not at_bound(refit.active[-1]):
             fitted.append((refit.log_posterior - weight * trial.cost, trial, refit))
     return sorted(fitted, key=lambda entry: -entry[0])
 
