@@ -203,17 +203,19 @@ def test_whoever_has_something_left_is_told_what_to_measure(rest, skipped, sente
         ((-0.05, -0.046, -0.09), ["T reads low in every run, by 0.046 to 0.09 N*m: read its zero before"]),
         ((0.05, 0.046, 0.09), ["T reads high in every run, by 0.046 to 0.09 N*m: read its zero before"]),
         ((0.05, -0.046, 0.09), []),
+        ((-0.046,), ["T reads low all along, by 0.046 N*m: read its zero before"]),
         ((0.005, 0.005, 0.005), []),  # a tenth of what else is left
     ],
 )
 def test_a_zero_that_every_run_has_to_one_side_is_to_be_read(zeros, told):
-    wave = 0.03 * np.sin(np.arange(300) * 0.2)
+    runs = len(zeros)
+    wave = 0.03 * np.sin(np.arange(100 * runs) * 0.2)
     residual = np.concatenate(
-        [zero + part - part.mean() for zero, part in zip(zeros, np.split(wave, 3), strict=True)]
+        [zero + part - part.mean() for zero, part in zip(zeros, np.split(wave, runs), strict=True)]
     )
     problem = Of(
-        model=Of(outputs=(Of(name="T", unit="N*m"),)), kept={"T": np.ones(300, bool)},
-        slices=tuple(slice(k, k + 100) for k in (0, 100, 200)),
+        model=Of(outputs=(Of(name="T", unit="N*m"),)), kept={"T": np.ones(100 * runs, bool)},
+        slices=tuple(slice(100 * k, 100 * k + 100) for k in range(runs)),
     )  # fmt: skip
     said = zeros_to_read(Of(problem=problem, augmented=Of(residual={"T": residual})))
     assert [text.split(" and after")[0] for text in said] == told

@@ -145,14 +145,14 @@ def zeros_to_read(search: Search) -> list[str]:
         runs = [residual[rows][kept[rows]] for rows in problem.slices if kept[rows].any()]
         means = sorted((float(np.mean(run)) for run in runs), key=abs)
         taken = sum(len(run) * float(np.mean(run)) ** 2 for run in runs)
-        if len(runs) < 2 or len(set(np.sign(means))) > 1 or taken < 0.5 * float(np.sum(residual[kept] ** 2)):
+        if len(set(np.sign(means))) != 1 or taken < 0.5 * float(np.sum(residual[kept] ** 2)):
             continue
-        low, high = (f"{abs(each):.2g}" for each in (means[0], means[-1]))
         side = "high" if means[0] > 0 else "low"
-        sentences.append(
-            f"{output.name} reads {side} in every run, by {low} to {with_unit(high, output.unit)}: read its "
-            "zero before and after each run."
+        low, high = f"{abs(means[0]):.2g}", with_unit(f"{abs(means[-1]):.2g}", output.unit)
+        where, when = (
+            (f"in every run, by {low} to", "each run") if len(runs) > 1 else ("all along, by", "the run")
         )
+        sentences.append(f"{output.name} reads {side} {where} {high}: read its zero before and after {when}.")
     return sentences
 
 
