@@ -145,7 +145,7 @@ def zeros_to_read(search: Search) -> list[str]:
         runs = [residual[rows][kept[rows]] for rows in problem.slices if kept[rows].any()]
         means = sorted((float(np.mean(run)) for run in runs), key=abs)
         taken = sum(len(run) * float(np.mean(run)) ** 2 for run in runs)
-        if len(set(np.sign(means))) != 1 or taken < 0.5 * float(np.sum(residual[kept] ** 2)):
+        if len(set(np.sign(means))) != 1 or taken < VERDICT.taken * float(np.sum(residual[kept] ** 2)):
             continue
         side = "high" if means[0] > 0 else "low"
         low, high = f"{abs(means[0]):.2g}", with_unit(f"{abs(means[-1]):.2g}", output.unit)

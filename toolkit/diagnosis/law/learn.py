@@ -131,13 +131,17 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out.
 
     Of an equation runs that differ ask as well: an input that came once moves its run as long as it rings.
+    So does, where nothing is named, a rest that is more than the sensor's noise: what it rings with is coloured.
     """
     strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
     motion = problem.model.capability.motion
     solved = motion is not None and motion.integrates
     affected = {part.output for part in structure if solved or part.is_lawful or part.is_too_large}
+    bare = solved and not base.active
     return tuple(
-        name for name in problem.names if strained or name in affected or _wanders(problem, base, name)
+        name
+        for name in problem.names
+        if strained or name in affected or (bare and _wanders(problem, base, name))
     )
 
 

@@ -223,13 +223,14 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
     if timed:
         times = np.concatenate([run.t for run in problem.runs])
         listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))
-    return tuple(each for each in listed if each.name == output or not _is_record_of(problem, output, each))
+    return tuple(each for each in listed if each.steady or not _is_record_of(problem, output, each))
 
 
 def _is_record_of(problem: Problem, output: str, signal: Signal) -> bool:
     """Tell whether a signal is an output that was recorded in another way: it foretells nothing of it.
 
-    The rate of a recorded position is the velocity that a simulation is to give, whatever that leaves out.
+    The rate of a recorded position is the velocity that a simulation is to give, whatever that leaves out. A
+    load that is recorded as it is put on is what its reading is held against.
     """
     recorded, own = unit(signal.unit), unit(channel_unit(problem.case, problem.model, output))
     if recorded.dimension != own.dimension:
