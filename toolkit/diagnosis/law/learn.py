@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ from toolkit.diagnosis.fit.folds import hold_out, matters
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
-from toolkit.diagnosis.law.terms import pulses_of, terms_of
+from toolkit.diagnosis.law.terms import exchanges_of, pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
     curve_trial,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Law:
-    """One law that was learned.
+    """One law that was learned; of an exchange the one in the other equation is its ``counterpart``.
 
     ``held_out_gain`` is None of an event; ``shares`` are what it takes of each output's mean square above
     the noise, on held-out rows where it predicts; ``confounded`` are the nominal parameters that moved far
@@ -63,6 +63,7 @@ class Law:
     share: float
     confounded: tuple[str, ...]
     resembles: tuple[tuple[str, float], ...] = ()
+    counterpart: Law | None = None
 
     @property
     def predicts(self) -> bool:
@@ -104,7 +105,7 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
                 listed += _unlocked(search.problem, base, outputs, listed)
                 break
             law, base, held_out = outcome
-            listed.append(law)
+            listed += [law] if law.counterpart is None else [law, law.counterpart]
             if search.problem.shown_sd:  # noise it may be now: what was none has been taken from it
                 rest = taken_for_noise(search.problem, search.folds, base, turn)
                 outputs = tuple(part.output for part in rest)
@@ -131,7 +132,7 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out.
 
     Of an equation runs that differ ask as well: an input that came once moves its run as long as it rings.
-    So does, where nothing is named, a rest that is more than the sensor's noise: what it rings with is coloured.
+    So does, where nothing is named, a rest that is more than the sensor's noise: what rings is coloured.
     """
     strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
     motion = problem.model.capability.motion
@@ -171,14 +172,22 @@ def _next(
         )
         if trial.applied.key not in present
     ]
-    looked = len(trials)
+    exchanges = [
+        trial
+        for trial in exchanges_of(problem, base, screen)
+        if not present.intersection(applied.key for applied in trial.together)
+    ]
+    looked = len(trials) + len(exchanges)
     likely = [
         trial
         for trial in ranked(problem, base, screen, trials, weight)
         if p_value(trial, looked) < LAWS.alpha
     ]
     near = [trial for trial in likely if trial.gain > STEP.far_behind * likely[0].gain]
-    fitted = _fitted(problem, base, near[: LAWS.fitted], weight)
+    near = near[: LAWS.fitted]
+    # Two equations at once are ranked with no single one: each of them is fitted.
+    near += [trial for trial in exchanges if p_value(trial, looked) < LAWS.alpha]
+    fitted = _fitted(problem, base, near, weight)
     if fitted and (drawn := curve_trial(problem, fitted[0][1])) is not None:
         best = fitted[0][0] - base.log_posterior
         curves = [
@@ -214,7 +223,7 @@ def _by_unseen_runs(
     order = _simplest_first([(each.gain, each.trial, each.fit) for each in shown])
     for gain, trial, refit in order:
         scores = next(each.held_out for each in shown if each.fit is refit)
-        if _is_told_from_none(refit, search.screen.trust(refit.noise)):
+        if _is_told_from_none(refit, search.screen.trust(refit.noise), len(trial.together)):
             p = min(1.0, math.exp(-min(gain, 700.0)))
             return _law(search, base, held_out, trial, refit, scores, p_value=p), refit, scores
     return None
@@ -235,8 +244,10 @@ def _fitted(
         least = -math.inf
         if len(scores) >= LAWS.judged:
             least = min(scores[-LAWS.judged], scores[-1] - VERDICT.close) + weight * trial.cost
-        refit = joint_fit(problem, base, (trial.applied,), least=least)
-        if refit is not None and refit.log_posterior >= least and not at_bound(refit.active[-1]):
+        refit = joint_fit(problem, base, trial.together, least=least)
+        if refit is None or refit.log_posterior < least:
+            continue
+        if not any(map(at_bound, refit.active[-len(trial.together) :])):
             fitted.append((refit.log_posterior - weight * trial.cost, trial, refit))
     return sorted(fitted, key=lambda entry: -entry[0])
 
@@ -262,7 +273,7 @@ def _judged(
     looked: int,
 ) -> tuple[Law, Fit, HeldOut] | None:
     problem = search.problem
-    if not _is_told_from_none(refit, search.screen.trust(refit.noise)):
+    if not _is_told_from_none(refit, search.screen.trust(refit.noise), len(trial.together)):
         return None
     scores = held_out
     if trial.form == "event":
@@ -312,7 +323,7 @@ def _law(
     p_value: float,
 ) -> Law:
     """Return a law that stands; an event's shares are those of the rows that it was fitted to."""
-    problem, applied = search.problem, refit.active[-1]
+    problem, fitted = search.problem, refit.active[-len(trial.together) :]
     moved = [
         parameter.name
         for parameter, before, after in zip(problem.free, base.p, refit.p, strict=True)
@@ -323,18 +334,21 @@ def _law(
         {name: problem.observed[name] - each.simulated[name] for name in problem.names}
         for each in ((base, refit) if event else (held_out, scores))
     ]
-    return Law(
+    law = Law(
         trial=trial,
-        applied=applied,
+        applied=fitted[0],
         p_value=p_value,
         held_out_gain=None if event else scores.total - held_out.total,
         share=_taken(problem, *errors),
         confounded=tuple(moved),
     )
+    if trial.partner is None:
+        return law
+    return replace(law, counterpart=replace(law, trial=trial.partner, applied=fitted[1]))
 
 
-def _is_told_from_none(refit: Fit, trust: float) -> bool:
-    """Tell whether the sizes of a fit's last effect, a law, are none only outside of their joint interval.
+def _is_told_from_none(refit: Fit, trust: float, count: int = 1) -> bool:
+    """Tell whether the sizes of each of a fit's last effects are none only outside of their joint interval.
 
     Parameters
     ----------
@@ -342,8 +356,8 @@ def _is_told_from_none(refit: Fit, trust: float) -> bool:
     """
     from scipy.stats import chi2
 
-    away, own = sizes_off(refit, refit.active[-1])
-    return bool(own) and away * trust > float(chi2.ppf(VERDICT.interval, len(own)))
+    sizes = [sizes_off(refit, applied) for applied in refit.active[-count:]]
+    return all(own and away * trust > float(chi2.ppf(VERDICT.interval, len(own))) for away, own in sizes)
 
 
 def _taken(problem: Problem, before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> float:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.law.ranking import all_responses
+from toolkit.diagnosis.law.ranking import all_responses, at_coefficients
 from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, ONE, TWO, Shape, pulse
 from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
@@ -50,6 +50,44 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
             arguments += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
         for shape, signals in arguments:
             yield from started(problem, shape, signals, "enters", channel, force=force)
+
+
+def exchanges_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterator[Trial]:
+    """Give what two states of one kind may exchange, with its gain: one law in the equations of both.
+
+    What one loses the other has, less or more by how much each holds. In one equation alone it would be a
+    loss to nowhere.
+    """
+    motion = problem.model.capability.motion
+    if motion is None or not motion.integrates:
+        return
+    states = {state.name for state in motion.states}
+    for pair in itertools.combinations([name for name in entered(problem, motion) if name in states], 2):
+        units = {reduced(motion.units(name)[1]) for name in pair}
+        if len(units) > 1:
+            continue
+        of_both = {
+            name: Signal(written=f"[{name}]", name=name, unit=next(iter(units)), values=np.zeros(1))
+            for name in pair
+        }
+        for shape in ALIKE:
+            trials = [
+                trial_at(
+                    problem, shape, tuple(of_both.values()), "enters", name, {},
+                    force=reduced(motion.units(name)[0]),
+                )
+                for name in pair
+            ]  # fmt: skip
+            answered = list(all_responses(problem, base, trials))
+            if any(each is None for each in answered):
+                continue
+            stacked = {
+                name: np.hstack([each[name] for each in answered if each is not None])
+                for name in problem.names
+            }
+            gain, sizes, trust = screen.gain(stacked)
+            first, other = (at_coefficients(trial, [size]) for trial, size in zip(trials, sizes, strict=True))
+            yield replace(first, partner=other, gain=gain * trust)
 
 
 def entered(problem: Problem, motion: Moving) -> dict[str, str]:

@@ -93,6 +93,7 @@ class Trial:
     ``unit`` is that of what it adds, or of its factor. ``swayed`` is, of a law that scales what drives a
     tire, how every output answers to its factor, (rows,). ``looked`` counts the laws that were looked at to
     find it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
+    ``partner`` is the same law in another equation: what one body loses the other has.
     """
 
     shape: Shape
@@ -104,6 +105,12 @@ class Trial:
     looked: int = 1
     sds: Mapping[str, float] = field(default_factory=dict)
     swayed: Mapping[str, Array] = field(default_factory=dict)
+    partner: Trial | None = None
+
+    @property
+    def together(self) -> tuple[AppliedEffect, ...]:
+        """The law, and that of its partner."""
+        return (self.applied, *(() if self.partner is None else self.partner.together))
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -124,7 +131,7 @@ class Trial:
     @property
     def cost(self) -> int:
         """Number of its parameters."""
-        return len(self.applied.effect.parameters)
+        return sum(len(applied.effect.parameters) for applied in self.together)
 
 
 def amplitudes(applied: AppliedEffect) -> tuple[str, ...]:
