@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
-    from toolkit.effects.law import Formula
+    from toolkit.effects.formula import Formula
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import Surroundings
 

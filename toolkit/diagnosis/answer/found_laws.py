@@ -18,7 +18,8 @@ from toolkit.diagnosis.answer.answer import (
 )
 from toolkit.diagnosis.law.trial import amplitudes
 from toolkit.diagnosis.policy import LAWS, VERDICT
-from toolkit.effects.law import SCALED, formula
+from toolkit.effects.formula import formula
+from toolkit.effects.law import SCALED
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array

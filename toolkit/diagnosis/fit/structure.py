@@ -14,7 +14,7 @@ import numpy as np
 
 from toolkit.diagnosis.policy import STRUCTURE
 from toolkit.diagnosis.simulators.setting import is_speed
-from toolkit.effects.law import way
+from toolkit.effects.formula import way
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.screen import LinearisedFit
-    from toolkit.effects.law import Formula
+    from toolkit.effects.formula import Formula
 
     Stacked = dict[str, Array]
 

@@ -46,7 +46,8 @@ from toolkit.diagnosis.search.unexplained import (
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import is_speed
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.law import ITSELF, SCALED, TIME, Acts, conversion, formula, law_effect, law_name
+from toolkit.effects.formula import formula
+from toolkit.effects.law import ITSELF, SCALED, TIME, Acts, conversion, law_effect, law_name
 from toolkit.errors import FitError
 from toolkit.units import unit
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from toolkit.arrays import Array
     from toolkit.effects.applied import Conditioned, EffectKey
-    from toolkit.effects.law import Remembered
+    from toolkit.effects.formula import Remembered
 
     Places = NDArray[np.intp]
     Seen = Mapping[str, Any]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toolkit.effects.law import formula
+from toolkit.effects.formula import formula
 from toolkit.errors import ConfigError
 
 T = np.linspace(0.0, 20.0, 2001)
