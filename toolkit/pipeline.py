@@ -14,6 +14,7 @@ from toolkit.characteristics.model import Characteristics
 from toolkit.errors import ConfigError, RecordingError
 from toolkit.findings import Finding
 from toolkit.machine import Machine, Protocol, load_machine, own_text
+from toolkit.recording.cut import cut_findings
 from toolkit.recording.folder import TestFolder
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.model import Recording
@@ -117,10 +118,14 @@ def process(
         [(*entry, speeds[entry[1].path]) for entry in named if entry[1].path in speeds],
         machine=machine, record=record, info=folder.info, tare=tare,
     )  # fmt: skip
-    hidden = [finding for name, one, _ in named for finding in hidden_findings(one.hidden, name)]
+    of_reading = [
+        finding
+        for name, one, _ in named
+        for finding in (*hidden_findings(one.hidden, name), *cut_findings(one.cut, name))
+    ]
     reduced = dataclasses.replace(
         reduced,
-        findings=(*reduced.findings, *tare_findings, *findings, *hidden),
+        findings=(*reduced.findings, *tare_findings, *findings, *of_reading),
         definition=own_text(folder.info.machine),
     )
     characteristics = characterise(reduced, machine=machine, record=record, sweeps=sweeps)

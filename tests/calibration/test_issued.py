@@ -17,7 +17,7 @@ from toolkit.calibration.issued import issued_text, issued_value
     ],
 )  # fmt: skip
 def test_a_last_zero_is_a_digit_that_was_issued(value: float, text: str) -> None:
-    assert issued_text(value) == text
+    assert issued_text(value, "ols") == text
 
 
 @given(
@@ -27,7 +27,7 @@ def test_the_text_is_the_value_in_five_digits_or_more(
     size: float, sign: float, extent: float, largest: float
 ) -> None:
     value = issued_value(sign * size, extent, largest)
-    text = issued_text(value)
+    text = issued_text(value, "ols")
     assert float(text) == value
     digits = text.partition("e")[0].replace(".", "").lstrip("-0")
     assert len(digits) >= 5

@@ -8,6 +8,7 @@ import pytest
 
 from tests.workbench.conftest import Served, plain
 from tests.workbench.test_home_page import command
+from toolkit.calibration.issued import issued_text
 from toolkit.machine import load_machine
 
 Capture = pytest.CaptureFixture[str]
@@ -21,6 +22,8 @@ def test_coefficients_are_those_of_show(served: Served, capsys: Capture) -> None
         assert coefficient in values
         assert load["issued"][term] in values
         assert load["standard_errors"][term] in values
+        digits = issued_text(load["issued"][term], load["method"]).replace("-", "\u2212")
+        assert f">{digits}</data>" in served.page("/record/cell-r1").body
 
 
 def test_the_fit_is_that_of_report(served: Served, capsys: Capture) -> None:

@@ -23,6 +23,7 @@ from toolkit.audit.weigh import impossible, inclinations, steps, weighed
 from toolkit.calibration.registry.clock import in_future
 from toolkit.errors import RecordError, RegistryError
 from toolkit.findings import Finding
+from toolkit.recording.cut import cut_findings
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.read import read_recording
 from toolkit.reduction.blocks import Block, block_means, find_blocks, is_tare
@@ -227,6 +228,7 @@ def inspect_file(
             *_of_context(path, context, why),
             *_of_channels(loaded_recording, path, context, corrector),
             *hidden_findings(recording.hidden, path.name),
+            *cut_findings(recording.cut, path.name),
         ),
     )
 

@@ -41,6 +41,7 @@ from toolkit.findings import Finding
 from toolkit.inputs import RECORDING_FILE, limit_of, read_regular
 from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
+from toolkit.recording.cut import cut_findings
 from toolkit.recording.folder import nearest_test_toml
 from toolkit.recording.hidden import hidden_findings
 from toolkit.recording.marks import is_corrected_copy, machine_in, own_output
@@ -303,6 +304,7 @@ class Auditor:
                     ),
                     *self._copied(path, data or b"", recording.sha256, name),
                     *hidden_findings(recording.hidden, name),
+                    *cut_findings(recording.cut, name),
                 )
             ),
         )

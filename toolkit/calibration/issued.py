@@ -27,14 +27,17 @@ def issued_value(coefficient: float, extent: float, largest: float) -> float:
     return coefficient
 
 
-def issued_text(value: float) -> str:
+def issued_text(value: float, method: str | None) -> str:
     """Return an issued coefficient in the digits in which it was issued: at least five, a last zero too.
 
-    A digit beyond the fifth is one that its use asked for, so it is no zero; `issued_value` chose them.
+    A digit beyond the fifth is one that its use asked for, so it is no zero; `issued_value` chose them. Those
+    of a legacy import stand as its document has them.
 
-    >>> issued_text(244.7), issued_text(-1486.06), issued_text(0.0027)
-    ('244.70', '-1486.06', '0.0027000')
+    >>> issued_text(244.7, "ols"), issued_text(-1486.06, "ols"), issued_text(0.0027, "legacy")
+    ('244.70', '-1486.06', '0.0027')
     """
+    if method == "legacy":
+        return repr(value)
     number = Decimal(repr(value))
     place = number.adjusted() - _FEWEST_DIGITS + 1
     if not number:

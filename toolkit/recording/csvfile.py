@@ -7,6 +7,7 @@ import contextlib
 import csv
 import re
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from toolkit.arrays import Array
 from toolkit.errors import UnreadableError
 from toolkit.machine import Machine
 from toolkit.recording.columns import header_of
+from toolkit.recording.cut import cut_number
 from toolkit.recording.table import Table
 
 # How a text table was saved: its encoding, what separates its cells, and its decimal sign.
@@ -195,7 +197,7 @@ def read_csv(data: bytes, where: Path, machine: Machine) -> Table:
         another encoding, or that can be read in more than one way
     """
     plain = _plain_table(data, where, machine)
-    if plain is not None:
+    if plain is not None and data.endswith(b"\n"):
         return plain
     text = decode(data, where=where)
     head = first_line(text)
@@ -217,6 +219,9 @@ def read_csv(data: bytes, where: Path, machine: Machine) -> Table:
             + ",".join(column.header for column in machine.columns),
             next_step=next_step, rule="not-a-workbook",
         )  # fmt: skip
+    cut = cut_number(text[-_PART:], separator)
+    if plain is not None:
+        return replace(plain, cut=cut)
     below = _iterate_rows(text, separator, where=where)
     next((row for row in below if any(cell.strip() for cell in row)), None)
     decimal = decimal_sign(chain.from_iterable(below), separator, where=where)
@@ -226,7 +231,7 @@ def read_csv(data: bytes, where: Path, machine: Machine) -> Table:
     width = max(map(len, rows), default=0)
     for row in rows:
         row += [""] * (width - len(row))
-    return Table(where=str(where), rows=rows)
+    return Table(where=str(where), rows=rows, cut=cut)
 
 
 def _titles(text: str, is_header: Callable[[str], bool]) -> int:

@@ -52,7 +52,8 @@ class Recording:
     """One file of a test. Rows count from 1 at the first data row.
 
     ``saved`` is the day on which the file, by its own properties, was last written; None where it is silent.
-    ``hidden`` are the worksheet's numbers of rows of data that the workbook hides.
+    ``hidden`` are the worksheet's numbers of rows of data that the workbook hides;
+    ``cut`` is the number within which a text file ends.
     """
 
     path: Path
@@ -63,6 +64,7 @@ class Recording:
     format: str
     saved: dt.date | None = None
     hidden: tuple[int, ...] = ()
+    cut: str | None = None
 
     @property
     def rows(self) -> int:

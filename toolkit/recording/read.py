@@ -53,15 +53,15 @@ def read_recording(
     """
     gated = gate(path, data)
     if gated.kind == "text":
+        table = read_csv(gated.data, path, machine)
         return Recording(
             path=path,
             sha256=gated.sha256,
             machine=machine,
-            series=_loads(
-                _measurable(path, read_table(read_csv(gated.data, path, machine), machine)), machine
-            ),
+            series=_loads(_measurable(path, read_table(table, machine)), machine),
             simulated=machine.simulated,
             format="csv",
+            cut=table.cut,
         )
     if gated.kind in READERS:
         vectors = READERS[gated.kind](gated.members.get(gated.kind, gated.data), path, machine)

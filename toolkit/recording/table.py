@@ -29,7 +29,8 @@ class Table:
 
     ``errors``: (reference, text) of cells with an error value, which readers return as empty. ``numbers``
     (rows, columns): what stands below ``rows``, where that is nothing but finite numbers; as wide as the last
-    of ``rows``. ``hidden`` are the numbers of rows that the workbook hides.
+    of ``rows``. ``hidden`` are the numbers of rows that the workbook hides. ``cut`` is the number within
+    which a text file ends.
     """
 
     where: str
@@ -37,6 +38,7 @@ class Table:
     errors: tuple[tuple[str, str], ...] = ()
     numbers: Array | None = None
     hidden: tuple[int, ...] = ()
+    cut: str | None = None
 
     def in_rows(self) -> Table:
         """Return the same table with all of its cells in ``rows``."""

@@ -10,6 +10,7 @@ Two spellings of one name are one person (`name_key`).
 from __future__ import annotations
 
 import functools
+import re
 import unicodedata
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -370,14 +371,21 @@ _CYRILLIC = str.maketrans("асеіјорѕухһԁԛԝвкмнт", "aceijopsyxh
 _GREEK = str.maketrans("αορνυικτχβηζ", "aopvuiktxbhz")
 
 
+# What is drawn as nothing and is no format character (Default_Ignorable_Code_Point of Unicode 15), and
+# letters and signs that are drawn as a blank.
+_UNDRAWN = re.compile("[\u034f\u17b4\u17b5\u180b-\u180f\ufe00-\ufe0f\ufff0-\ufff8\U000e0000-\U000e0fff]")
+_BLANK = re.compile("[\u115f\u1160\u2800\u3164\uffa0]")
+
+
 def name_key(name: str) -> str:
     """Return what two spellings of one name have in common; empty where nothing can be seen.
 
     >>> name_key(" J.  Smith ") == name_key("j. smith") == name_key("J. S\u200bmith")
     True
     """
+    drawn = _BLANK.sub(" ", _UNDRAWN.sub("", name))
     # Compatibility forms first: they may unfold to spaces, capitals and marks.
-    text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
+    text = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", drawn).casefold())
     visible = "".join(
         c for c in text if unicodedata.category(c) not in ("Cf", "Cc", "Cn", "Co") or c.isspace()
     )

@@ -19,6 +19,7 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
+from toolkit.calibration.issued import issued_text
 from toolkit.errors import ToolkitError
 from toolkit.estimate import plus_minus, round_uncertainty
 from toolkit.lab.answers import one_line
@@ -87,7 +88,7 @@ def templates(language: str) -> Environment:
     drawn.add_extension("jinja2.ext.i18n")
     drawn.install_gettext_translations(translations(language), newstyle=False)  # type: ignore[attr-defined]
     drawn.globals |= {"language": language, "point": decimal_sign(language)}
-    drawn.globals |= {"number": _number, "measured": _measured, "expanded": _expanded}
+    drawn.globals |= {"number": _number, "issued": _issued, "measured": _measured, "expanded": _expanded}
     drawn.filters |= {"chart": _chart, "one_line": one_line, "holding_id": holding_id}
     drawn.filters["said"] = phrasebook(language).say
     return drawn
@@ -145,6 +146,12 @@ def _number(
     digits = _printed(context, format(times * value, form))
     text = f"{digits}\u00a0{unit}" if unit else digits
     return data(json.dumps(value), text)
+
+
+@pass_context
+def _issued(context: Context, value: float, method: str | None) -> str:
+    """Return an issued coefficient in the digits of its issue."""
+    return data(json.dumps(value), _printed(context, issued_text(value, method)))
 
 
 @pass_context

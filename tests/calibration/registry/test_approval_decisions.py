@@ -35,7 +35,8 @@ def run(registry: Registry) -> Run:
     [
         "operator one", "OPERATOR One", "  operator\tone ", "operator\u00a0one", "operator\u200b one",
         "\uff4fperator one", "\u043eperator one", "\u03bfperat\u03bfr one", "oper\u00adator one", "",
-        "\u200b",
+        "\u200b", "opera\u034ftor one", "operator one\ufe0f", "operator\u3164one", "operator\u2800 one",
+        "operator \U000e0101one", "\u3164",
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("role", ["checked", "approved"])

@@ -94,8 +94,8 @@ class LoadFit:
 
     @property
     def issued_texts(self) -> tuple[str, ...]:
-        """Issued coefficients in the digits of their issue, of a legacy import as its document has them."""
-        return tuple((repr if self.method == "legacy" else issued_text)(value) for value in self.issued)
+        """Issued coefficients in the digits of their issue."""
+        return tuple(issued_text(value, self.method) for value in self.issued)
 
     @property
     def standard_errors(self) -> tuple[float, ...]:

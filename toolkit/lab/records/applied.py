@@ -23,6 +23,7 @@ from toolkit.findings import Finding, FindingEntry
 from toolkit.inputs import RECORDING_FILE, read_input
 from toolkit.lab.records.record import Loads, Record
 from toolkit.recording.columns import rig
+from toolkit.recording.cut import cut_findings
 from toolkit.recording.extras import needed
 from toolkit.recording.formats.mdf import mdf_bytes
 from toolkit.recording.formats.tdms import tdms_bytes
@@ -72,7 +73,8 @@ def read_indications(path: Path, record: Record) -> tuple[tuple[Series, ...], li
     if sniff(data).id == "parquet":
         return series_of(_parquet(data, path), machine), []
     recording = read_recording(path, machine, data=data)
-    return recording.series, hidden_findings(recording.hidden, path.name)
+    cut = cut_findings(recording.cut, path.name)
+    return recording.series, [*hidden_findings(recording.hidden, path.name), *cut]
 
 
 def _parquet(data: bytes, path: Path) -> Vectors:
