@@ -28,7 +28,7 @@ _NAMED = 5  # rows named in the influence figure
 
 def report_figures(report: FitReport, *, title: str) -> dict[str, bytes]:
     """Return the figures of a load by file name, PNG and SVG of each; ``title`` names record or session."""
-    files = {}
+    files: dict[str, bytes] = {}
     for name, (draw, caption) in _drawings(report).items():
         with drawing_style():
             figure = _figure(draw, f"{title}, {report.load}: {caption}")
