@@ -129,7 +129,9 @@ def test_where_positions_are_the_sum_of_what_came_before_the_squares_of_rates_ar
     tmp_path, monkeypatch
 ):
     """Where the specification test trusts least squares, they are those of what counts: of the rates."""
-    monkeypatch.setattr(importlib.import_module("toolkit.diagnosis.fit.fit"), "_absorbs", lambda *_: True)
+    monkeypatch.setattr(
+        importlib.import_module("toolkit.diagnosis.fit.fit"), "_absorbs", lambda *_, **__: True
+    )
     case = written(tmp_path, runs(2, zero=0.3))
     problem = problem_of(case, model_of(case, None))
     by_positions = fit(problem)

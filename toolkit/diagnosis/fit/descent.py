@@ -30,10 +30,16 @@ if TYPE_CHECKING:
 
     Stacked = dict[str, Array]
 
-_TRIALS = 12
-_AGAIN = 3
+_TRIALS = 30
+_PROMISED = 1e-4  # of the log-likelihood, a seventieth of a standard deviation: no step is worth less
+_CREPT, _CREEPING = 4, 0.05  # trials, that together gain no more of the log-likelihood: it is rough there
+_ROUGH = 1.0  # of the log-likelihood, that is promised there: of more it is worth to look on
+_INSIDE = 0.9  # of the way to an effect's bound: where a wave has no size, none of its other values tells any
+_NO_WAY = 1e-5  # of a parameter's size: the step after it would be smaller by orders
+_POOR, _GOOD = 0.25, 0.75  # of what a step promised: the next may lead a part as far, or farther
+_DAMPING, _DAMPED = 1e-6, 4.0  # of the derivatives' square, and by as much more until a step is short enough
 _BENT = 0.3  # of a step's response: more off the straight line, and derivatives are taken anew
-_STRAIGHT = 0.02  # of the whole way's response: less off, and they were good enough to end on
+_STRAIGHT = 0.01  # of the whole way's response: less off, and they were good enough to end on
 _NOTHING = 0.1  # standard deviations of the noise, over the whole recording: no way at all
 _RAN_AWAY = 1e100  # standard deviations: the square of more is no number
 
@@ -45,17 +51,18 @@ class Derivatives:
         self.space = space
         self._last: tuple[Array, Stacked, Stacked] | None = None
         self._fresh: tuple[Array, Stacked, Stacked] | None = None
+        self.reach: Array | None = None  # over more than what the data leave open nothing is a derivative
 
     def kept(self) -> Derivatives:
         """Return the last differences for another descent, which corrects them on its own way."""
         other = Derivatives(self.space)
-        other._last = other._fresh = self._fresh
+        other._last, other._fresh, other.reach = self._fresh, self._fresh, self.reach
         return other
 
     def anew(self, x: Array) -> Stacked:
         """Return the derivatives at a vector by differences."""
         if self._fresh is None or not np.array_equal(self._fresh[0], x):
-            self._fresh = (x.copy(), *self.space.around(x))
+            self._fresh = (x.copy(), *self.space.around(x, self.reach))
         self._last = self._fresh
         return self._fresh[2]
 
@@ -79,6 +86,10 @@ class Derivatives:
             {name: slope + np.outer(off[name], along) for name, slope in slopes.items()},
         )
         return self._last[2]
+
+    def are_fresh(self, x: Array) -> bool:
+        """Tell whether the last derivatives are differences at a vector, and not corrected."""
+        return self._last is self._fresh and self._fresh is not None and np.array_equal(self._fresh[0], x)
 
     def trusted(self, x: Array, weighing: Weighing) -> bool:
         """Tell whether the last differences were taken near enough to a vector for it to be an answer."""
@@ -153,40 +164,109 @@ def descend(
     noise: dict[str, Autoregression],
     derivatives: Derivatives,
     drifting: Mapping[str, Differences] = MappingProxyType({}),
+    *,
+    share: float = 0.0,
 ) -> Array:
     """Return the vector of least squares, searched from ``x``.
+
+    A step is that of the linear problem within the bounds and within a radius. The search ends where the
+    whole linear problem promises less than anybody would notice: nothing is simulated to see that.
 
     Parameters
     ----------
     noise : by which each output is whitened
     derivatives : found before, or empty; they are kept up
     drifting : outputs of which differences count
+    share : of the squares, below which a promise is none: of a search that another one follows
     """
-    from scipy.optimize import least_squares
-
     if not len(x):
         return x
     weighing = Weighing(space, layouts, noise, drifting)
+    residual = weighing.cost(x)
+    square, radius = 0.5 * float(residual @ residual), max(float(np.linalg.norm(x)), 1.0)
+    free = len(space.problem.free)
 
-    def slope(v: Array) -> Array:
-        return weighing.slope(derivatives.at(v, weighing))
+    def about(slopes: Stacked) -> Linear:
+        linear = Linear.of(weighing.slope(slopes), residual)
+        derivatives.reach = linear.reach
+        return linear
 
-    for _ in range(_AGAIN):
-        x = least_squares(
-            weighing.cost,
-            x,
-            slope,
-            bounds=(space.low, space.high),
-            x_scale=1.0,
-            max_nfev=_TRIALS,
-            ftol=1e-6,
-            xtol=1e-5,  # of a parameter's size: the step after it would be smaller by orders
-            gtol=1e-9,
-        ).x
-        if derivatives.trusted(x, weighing):
+    linear = about(derivatives.at(x, weighing))
+    trials, squares = _TRIALS, [square]
+    while trials:
+        low, high = space.low - x, space.high - x
+        step, promised = linear.step(low, high)
+        crept = len(squares) > _CREPT and squares[-_CREPT - 1] - square < _CREEPING
+        if crept and promised < _ROUGH:
             break
-        derivatives.anew(x)
+        if promised < max(_PROMISED, share * square):
+            if share or derivatives.trusted(x, weighing):
+                break
+            linear, trials = about(derivatives.anew(x)), trials - 1
+            continue
+        if promised > _ROUGH:
+            low[free:], high[free:] = _INSIDE * low[free:], _INSIDE * high[free:]
+            step, promised = linear.step(low, high)
+        if np.linalg.norm(step) > radius:
+            step, promised = linear.step(low, high, radius)
+        there = np.clip(x + step, space.low, space.high)
+        way = float(np.linalg.norm(there - x))
+        if way < _NO_WAY * (_NO_WAY + float(np.linalg.norm(x))):
+            break
+        trials -= 1
+        tried = weighing.cost(there)
+        reached = 0.5 * float(tried @ tried)
+        gained = (square - reached) / promised
+        if gained < _POOR:
+            radius = _POOR * way
+        elif gained > _GOOD:
+            radius = max(radius, 2 * way)
+        if reached < square:
+            x, residual, square = there, tried, reached
+            linear = about(derivatives.at(x, weighing))
+        elif not derivatives.are_fresh(x):
+            linear = about(derivatives.anew(x))
+        squares.append(square)
     return x
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linear:
+    """A problem of least squares, linear about a vector: ``factor`` times the step is to be ``target``."""
+
+    factor: Array
+    target: Array
+
+    @staticmethod
+    def of(slope: Array, residual: Array) -> Linear:
+        """Return it with as many rows as parameters, in place of the recording's."""
+        triangle = np.asarray(np.linalg.qr(np.column_stack([slope, residual]), mode="r"))
+        return Linear(triangle[: slope.shape[1], :-1], -triangle[: slope.shape[1], -1])
+
+    @property
+    def reach(self) -> Array:
+        """Standard deviation of every parameter with the others as they are, (k,)."""
+        return np.asarray(1 / np.maximum(np.linalg.norm(self.factor, axis=0), 1e-300))
+
+    def step(self, low: Array, high: Array, radius: float = math.inf) -> tuple[Array, float]:
+        """Return the best step within bounds, (k,), and by how much it promises to lower half the square.
+
+        Parameters
+        ----------
+        radius : beyond which no step leads; damping keeps it within (Levenberg and Marquardt)
+        """
+        from scipy.optimize import lsq_linear
+
+        step, damping = np.zeros(0), 0.0
+        while not len(step) or np.linalg.norm(step) > radius:
+            damped = (
+                np.vstack([self.factor, math.sqrt(damping) * np.eye(len(low))]) if damping else self.factor
+            )
+            target = np.concatenate([self.target, np.zeros(len(damped) - len(self.target))])
+            step = lsq_linear(damped, target, bounds=(low, high), method="bvls").x
+            damping = _DAMPED * damping or _DAMPING * float(np.linalg.norm(self.factor)) ** 2
+        left = self.factor @ step - self.target
+        return step, 0.5 * float(self.target @ self.target - left @ left)
 
 
 _STEP = 1e-4  # of a parameter's size, for differences
@@ -280,17 +360,21 @@ class Space:
         """Return recorded less simulated."""
         return {name: self.problem.observed[name] - simulated[name] for name in simulated}
 
-    def around(self, x: Array) -> tuple[Stacked, Stacked]:
+    def around(self, x: Array, reach: Array | None = None) -> tuple[Stacked, Stacked]:
         """Return what is simulated at a vector, and d(simulated)/dx by one-sided differences.
 
         They are (rows,) and (rows, parameters) for each output.
+
+        Parameters
+        ----------
+        reach : over which no difference goes, (k,)
 
         Raises
         ------
         FitError
             the simulation gives no usable output at the vector itself
         """
-        points = self._moved(x)
+        points = self._moved(x, reach)
         # Together they have the same steps: what these leave is then no part of a difference.
         self.problem.prepare([self.split(point) for point in (x, *points)])
         simulated = self._anew(x, x.tobytes())
@@ -304,10 +388,10 @@ class Space:
                 slopes[name][:, i] = (column - simulated[name]) / (moved[i] - x[i])
         return simulated, slopes
 
-    def _moved(self, x: Array) -> list[Array]:
-        points = []
+    def _moved(self, x: Array, reach: Array | None) -> list[Array]:
+        points, most = [], np.full(len(x), math.inf) if reach is None else reach
         for i in range(len(x)):
-            step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (self.high[i] - self.low[i]))
+            step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (self.high[i] - self.low[i]), most[i])
             step = -step if x[i] + step > self.high[i] else step
             moved = x.copy()
             moved[i] += step

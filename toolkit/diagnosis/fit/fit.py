@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from toolkit.diagnosis.fit.descent import Derivatives, Space, descend
+from toolkit.diagnosis.fit.descent import Derivatives, Linear, Space, Weighing, descend
 from toolkit.diagnosis.fit.noise import (
     Autoregression,
     Differences,
@@ -100,6 +100,8 @@ def _correlated(columns: Array, where: Layout, noise: Autoregression) -> Array:
 
 _OUTER = 4  # times that the noise is estimated anew
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
+_MARGIN = 0.5  # of what tells that noise has absorbed physics: nearer to it than that, both are fitted
+_ROUGH = 1e-3  # of the squares: a first round that leads no farther is good enough to see the noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -168,7 +170,9 @@ def fit(
     if solved.score < least:  # ordinary least squares are no likelier: the plain solution cannot reach it
         plain, intervals = False, False
     if plain is None:
-        alternative = _plain(space, layouts, solved, derivatives)
+        alternative = _plain_nearby(space, layouts, solved, derivatives)
+        if alternative is not None and _absorbs(space, solved, alternative, layouts, margin=_MARGIN):
+            alternative = _plain(space, layouts, solved, derivatives)
         plain = alternative is not None and _absorbs(space, solved, alternative, layouts)
         solution = alternative if plain and alternative is not None else solved
     else:
@@ -181,7 +185,9 @@ def fit(
         simulated=solution.simulated,
         noise=solution.noise,
         log_posterior=solution.score,
-        covariance=_covariance(space, solution, None if plain else alternative, layouts, plain=plain)
+        covariance=_covariance(
+            space, solution, None if plain else alternative, layouts, derivatives, plain=plain
+        )
         if intervals
         else np.zeros((0, 0)),
         rows=rows,
@@ -210,9 +216,11 @@ def _coloured(
     best: _Solved | None = None
     noise_now = noise
     for turn in range(max(rounds, 1)):
+        first = noise_now is None
         if noise_now is None:
             noise_now = _white(space.problem, space.residual(space.simulated(x)), layouts)
-        solved = _solve(space, layouts, x, noise_now, derivatives)
+        # White noise of what the start leaves is nobody's: it only leads to where the noise can be seen.
+        solved = _solve(space, layouts, x, noise_now, derivatives, share=_ROUGH if first else 0.0)
         if best is not None and solved.score < best.score + _BETTER:
             return solved if solved.score > best.score else best
         if best is not None and 2 * solved.score - best.score < least:
@@ -231,18 +239,46 @@ def _plain(
     Of an output that only drifts they are those of its differences: its own squares are the sum of all that
     pushed it before, and the smallest sum says nothing of what each push was.
     """
-    coloured = any(autoregression.reflection for autoregression in from_.noise.values())
-    if not len(from_.x) or not coloured:
+    if not _is_coloured(from_):
         return None
     drifting = _drifting(space, layouts)
+    return _solve(space, layouts, from_.x, _worth(space, from_, drifting), derivatives, drifting)
+
+
+def _plain_nearby(
+    space: Space, layouts: dict[str, Layout], from_: _Solved, derivatives: Derivatives
+) -> _Solved | None:
+    """Return where ordinary least squares lead as far as the derivatives tell; None for white noise.
+
+    Nothing is simulated: where the straight way leads to hardly less, so does the bent one.
+    """
+    if not _is_coloured(from_):
+        return None
+    drifting = _drifting(space, layouts)
+    weighing = Weighing(space, layouts, _worth(space, from_, drifting), drifting)
+    slopes = derivatives.at(from_.x, weighing)
+    step = Linear.of(weighing.slope(slopes), weighing.cost(from_.x)).step(
+        space.low - from_.x, space.high - from_.x
+    )[0]
+    simulated = {name: column + slopes[name] @ step for name, column in from_.simulated.items()}
+    residual = space.residual(simulated)
+    noise = noise_of(space.problem, residual, layouts, used=len(step))
+    return _Solved(from_.x + step, simulated, residual, noise, -math.inf)
+
+
+def _is_coloured(solved: _Solved) -> bool:
+    return len(solved.x) > 0 and any(each.reflection for each in solved.noise.values())
+
+
+def _worth(space: Space, from_: _Solved, drifting: dict[str, Differences]) -> dict[str, Autoregression]:
+    """Return white noise by which every output is weighed by what its rows are worth."""
     noise = from_.noise | _noise_of_differences(space, from_, drifting)
-    weights = {
+    return {
         name: Autoregression(
             reflection=(), sd=autoregression.marginal_sd * math.sqrt(autoregression.correlation_rows)
         )
         for name, autoregression in noise.items()
     }
-    return _solve(space, layouts, from_.x, weights, derivatives, drifting)
 
 
 def _drifting(space: Space, layouts: dict[str, Layout]) -> dict[str, Differences]:
@@ -258,12 +294,18 @@ def _noise_of_differences(
     }
 
 
-def _absorbs(space: Space, coloured: _Solved, plain: _Solved, layouts: dict[str, Layout]) -> bool:
+def _absorbs(
+    space: Space, coloured: _Solved, plain: _Solved, layouts: dict[str, Layout], *, margin: float = 1.0
+) -> bool:
     """Tell whether the coloured fit leaves a larger residual than noise alone can explain.
 
     Under the right model both estimate the same, and the plain one is smaller by what its parameters take.
     Where the coloured one is much larger, its noise has absorbed physics (a specification test in the
     manner of Hausman), and the plain one is to be trusted.
+
+    Parameters
+    ----------
+    margin : of what noise alone can explain
     """
     drifting = _drifting(space, layouts)
     noise = plain.noise | _noise_of_differences(space, plain, drifting)
@@ -274,9 +316,8 @@ def _absorbs(space: Space, coloured: _Solved, plain: _Solved, layouts: dict[str,
         ]
         coloured_square, plain_square = (float(np.mean(rows**2)) if len(rows) else 0.0 for rows in judged)
         worth = noise[name].correlation_rows / max(len(judged[0]), 1)
-        if coloured_square > plain_square * (
-            1 + NOISE.absorbed + NOISE.absorbed_by_chance * len(plain.x) * worth
-        ):
+        by_chance = NOISE.absorbed + NOISE.absorbed_by_chance * len(plain.x) * worth
+        if coloured_square > plain_square * (1 + margin * by_chance):
             return True
     return False
 
@@ -288,8 +329,9 @@ def _solve(
     weights: dict[str, Autoregression],
     derivatives: Derivatives,
     drifting: Mapping[str, Differences] = MappingProxyType({}),
+    share: float = 0.0,
 ) -> _Solved:
-    x = descend(space, layouts, x, weights, derivatives, drifting)
+    x = descend(space, layouts, x, weights, derivatives, drifting, share=share)
     simulated = space.simulated(x)
     residual = space.residual(simulated)
     noise = noise_of(space.problem, residual, layouts, used=len(x))
@@ -407,7 +449,13 @@ def _score(
 
 
 def _covariance(
-    space: Space, solved: _Solved, alternative: _Solved | None, layouts: dict[str, Layout], *, plain: bool
+    space: Space,
+    solved: _Solved,
+    alternative: _Solved | None,
+    layouts: dict[str, Layout],
+    derivatives: Derivatives,
+    *,
+    plain: bool,
 ) -> Array:
     """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
 
@@ -416,7 +464,7 @@ def _covariance(
     """
     if not len(solved.x):
         return np.zeros((0, 0))
-    J = space.around(solved.x)[1]
+    J = derivatives.anew(solved.x)
     prior = space.problem.prior_rows(space.sizes, len(solved.x))
 
     def of_plain(solution: _Solved) -> Array:
@@ -433,9 +481,18 @@ def _covariance(
     if plain:
         return of_plain(solved)
     matrix = covariance(J, prior, space.sizes, layouts, solved.noise, plain=False)
-    if alternative is not None:
-        unsure = np.diag(of_plain(alternative))
-        apart = ((alternative.x - solved.x) * space.sizes) ** 2
+
+    def disagreeing(other: _Solved) -> Array:
+        unsure = np.diag(of_plain(other))
+        apart = ((other.x - solved.x) * space.sizes) ** 2
         expected = np.maximum(unsure - np.diag(matrix), 0.0)
-        matrix = matrix + np.diag(np.where(apart > NOISE.apart**2 * expected, apart, 0.0))
-    return matrix
+        return np.where(apart > NOISE.apart**2 * expected, apart, 0.0)
+
+    if alternative is None:
+        return matrix
+    added = disagreeing(alternative)
+    if (
+        added.any() and alternative.score == -math.inf
+    ):  # the straight way alone: the bent one tells by how much
+        added = disagreeing(_plain(space, layouts, solved, derivatives) or alternative)
+    return matrix + np.diag(added)

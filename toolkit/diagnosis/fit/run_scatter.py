@@ -85,11 +85,36 @@ class _Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Output:
-    """The runs of one output under a noise, and the likelihood of its values but for their squares."""
+    """The runs of one output under a noise, and the likelihood of its values but for their squares.
+
+    What the runs have in ``parts`` stands here over all of them: summed where no scatter weighs it, else one
+    behind the other.
+    """
 
     parts: tuple[_Part, ...]
     constant: float
     size: float
+    fitted: Array  # J'J
+    across: Array  # J'X of every run
+    inner: Array  # X'X of every run
+    answer: Array  # J'y
+    outer: Array  # X'y of every run
+    rest: float  # y'y
+
+    @staticmethod
+    def of(parts: tuple[_Part, ...], constant: float, size: float) -> _Output:
+        return _Output(
+            parts, constant, size, np.sum([part.fitted for part in parts], axis=0),
+            np.stack([part.across for part in parts]), np.stack([part.inner for part in parts]),
+            np.sum([part.answer for part in parts], axis=0), np.stack([part.outer for part in parts]),
+            sum(part.rest for part in parts),
+        )  # fmt: skip
+
+    def weighed(self, scale: tuple[float, float]) -> tuple[Array, Array]:
+        """Return of every run what a scatter makes of its zero and gain (2, 2), and what it takes of J'X."""
+        zero_gain = np.array(scale)
+        inside = np.eye(2) + zero_gain[:, None] * self.inner * zero_gain
+        return inside, self.across @ (zero_gain[:, None] * np.linalg.inv(inside) * zero_gain)
 
 
 def with_run_scatter(problem: Problem, made: Fit) -> tuple[Fit, tuple[RunScatter, ...]]:
@@ -284,16 +309,16 @@ def _output(problem: Problem, made: Fit, name: str, columns: Array) -> _Output:
     )
     white = whiten(np.hstack([columns[where.index], own, residual[:, None]]), where, noise)
     J, X, y = white[:, :-3], white[:, -3:-1], white[:, -1]
-    return _Output(
-        parts=tuple(
+    return _Output.of(
+        tuple(
             _Part(
                 fitted=J[rows].T @ J[rows], across=J[rows].T @ X[rows], inner=X[rows].T @ X[rows],
                 answer=J[rows].T @ y[rows], outer=X[rows].T @ y[rows], rest=float(y[rows] @ y[rows]),
             )
             for rows in runs
         ),
-        constant=log_likelihood(residual, where, noise) + 0.5 * float(y @ y),
-        size=size,
+        log_likelihood(residual, where, noise) + 0.5 * float(y @ y),
+        size,
     )  # fmt: skip
 
 
@@ -305,12 +330,9 @@ def _solved(outputs: Mapping[str, _Output], beneath: _Beneath, sizes: _Sizes) ->
     """Return by what the fit moves beside a scatter, and its normal matrix."""
     normal, answer = beneath[0].copy(), beneath[1].copy()
     for name, output in outputs.items():
-        scale = np.array(sizes[name])
-        for part in output.parts:
-            middle = np.linalg.inv(np.eye(2) + scale[:, None] * part.inner * scale)
-            weight = scale[:, None] * middle * scale
-            normal += part.fitted - part.across @ weight @ part.across.T
-            answer += part.answer - part.across @ weight @ part.outer
+        _, taken = output.weighed(sizes[name])
+        normal += output.fitted - np.tensordot(taken, output.across, axes=((0, 2), (0, 2)))
+        answer += output.answer - np.tensordot(taken, output.outer, axes=((0, 2), (0, 1)))
     return np.asarray(np.linalg.lstsq(normal, answer, rcond=1e-12)[0]), normal
 
 
@@ -321,15 +343,12 @@ def _likelihood(
     moved, normal = _solved(outputs, beneath, sizes)
     total, answer = 0.0, beneath[1].copy()
     for name, output in outputs.items():
-        scale = np.array(sizes[name])
-        total += output.constant
-        for part in output.parts:
-            inside = np.eye(2) + scale[:, None] * part.inner * scale
-            middle = np.linalg.inv(inside)
-            weight = scale[:, None] * middle * scale
-            total -= 0.5 * (part.rest - float(part.outer @ weight @ part.outer))
-            total -= 0.5 * float(np.linalg.slogdet(inside)[1])
-            answer += part.answer - part.across @ weight @ part.outer
+        inside, taken = output.weighed(sizes[name])
+        scaled = output.outer * np.array(sizes[name])
+        own = float(np.sum(scaled * np.linalg.solve(inside, scaled[:, :, None])[:, :, 0]))
+        total += output.constant - 0.5 * (output.rest - own)
+        total -= 0.5 * float(np.linalg.slogdet(inside)[1].sum())
+        answer += output.answer - np.tensordot(taken, output.outer, axes=((0, 2), (0, 1)))
     total += 0.5 * float(answer @ moved)
     if restricted:
         total -= 0.5 * float(np.linalg.slogdet(normal + 1e-300 * np.eye(len(normal)))[1])

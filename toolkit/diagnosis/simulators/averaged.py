@@ -140,6 +140,7 @@ class MeansOf:
             plain.capability,
             averages=False,
             repeats=None,
+            together=None if plain.capability.together is None else self._together,
             motion=None if motion is None else dataclasses.replace(motion, pushed=self._pushed),
         )
 
@@ -162,6 +163,18 @@ class MeansOf:
     def places(self, effect: Effect) -> Sequence[tuple[str | None, str | None]]:
         """Return where an effect could act."""
         return self._plain.places(effect)
+
+    def _together(
+        self, runs: Sequence[Run], points: Sequence[tuple[Parameters, Sequence[AppliedEffect]]]
+    ) -> None:
+        """Have both simulations make at once what `simulate` asks of them."""
+        of_rows, steady = self._plain.capability.together, self._smooth.capability.together
+        assert of_rows is not None  # noqa: S101  else nobody asks
+        assert steady is not None  # noqa: S101  of the same kind
+        known = [self._runs[run] for run in runs if run in self._runs]
+        of_rows([whole for whole, _, _ in known], [(p, ()) for p, _ in points])
+        acting = [(p, each) for p, active in points if active for each in ((), active)]
+        steady([even for _, even, _ in known], acting)
 
     def _pushed(
         self,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from hashlib import blake2b
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +13,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.along_recordings import AlongRecordings
 from toolkit.diagnosis.simulators.array_table import ArrayTable, Trials
 from toolkit.diagnosis.simulators.channels import true_inputs
+from toolkit.diagnosis.simulators.memory import Memory
 from toolkit.diagnosis.simulators.tire import base_drive, late, through_tire, tire_signs
 from toolkit.diagnosis.simulators.user_code import load_functions, raised, silenced
 from toolkit.effects.applied import AppliedEffect
@@ -26,9 +29,11 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.simulators.case_code import CaseCode
     from toolkit.worker.serve import Handlers
 
+    Question = tuple[Run, Mapping[str, float], Mapping[str, Array]]
     Answer = Callable[[Run, Mapping[str, float], Mapping[str, Array]], Arrays]
+    Answers = Callable[[Sequence[Question]], list[Arrays | None]]
 
-_KEPT = 300  # simulations that are remembered
+_KEPT, _HELD = 2_000, 200_000_000  # simulations of a run that are remembered, and their bytes
 LARGEST = 1e100  # of an output in its unit: the squares of larger ones are no numbers any more
 # Drive's field -> the channel that a simulator takes it from.
 _FIELDS = (("SA", ("SA", "SA_CMD")), ("FZ", ("FZ", "FZ_CMD")), ("IA", ("IA",)), ("V", ("V",)))
@@ -104,16 +109,21 @@ class UserFunction:
 class PythonModel(AlongRecordings):
     """A simulator in Python: ``simulate(inputs, p)`` returns one row for each row of inputs.
 
-    ``answer`` is its function with checked outputs, in this process or in a worker.
+    ``answer`` is its function with checked outputs, in this process or in a worker. Each question of a worker
+    is a way there and back: ``answers`` are those of many at once, None of what gives no usable output.
     """
 
-    def __init__(self, case: Case, answer: Answer) -> None:
+    def __init__(self, case: Case, answer: Answer, answers: Answers | None = None) -> None:
         super().__init__(case)
-        self._called = answer
+        self._called, self._answers = answer, answers
         self._names = {channel.name for channel in case.channels}
         self.inputs = frozenset(channel.name for channel in case.drivers if channel.role == "input")
-        self._kept: dict[tuple[Run, tuple[float, ...]], Arrays] = {}
-        self.capability = self.capability_with(unsure={}, findings=(), repeats=self._repeats)
+        self._kept: Memory[Arrays] = Memory(_KEPT, _HELD)
+        self._last: dict[Run, Mapping[str, Array]] = {}  # what was changed of a run's inputs, last time
+        self.capability = replace(
+            self.capability_with(unsure={}, findings=(), repeats=self._repeats),
+            together=None if answers is None else self._together,
+        )
 
     def own_outputs(
         self, run: Run, p: Mapping[str, float], active: Sequence[AppliedEffect], around: Setting
@@ -134,14 +144,34 @@ class PythonModel(AlongRecordings):
 
         The same inputs and parameters give the same outputs: a slow simulator is not asked twice.
         """
-        key = (run, tuple(p.values()))
-        if changed:
-            return self._called(run, p, changed)
+        key = _key(run, p, changed)
         if key not in self._kept:
-            if len(self._kept) >= _KEPT:
-                self._kept.pop(next(iter(self._kept)))
             self._kept[key] = self._called(run, p, changed)
+        if changed:
+            self._last[run] = changed
         return self._kept[key]
+
+    def _together(
+        self,
+        runs: Sequence[Run],
+        points: Sequence[tuple[Mapping[str, float], Sequence[AppliedEffect]]],
+    ) -> None:
+        """Ask at once what `simulate` will ask: with inputs as recorded, and as effects changed them last."""
+        assert self._answers is not None  # noqa: S101  or this is not asked
+        asked: dict[object, Question] = {}
+        for p, active in points:
+            if any(applied.channel in self.inputs for applied in active):
+                continue
+            drives = any(applied.effect.drive is not None for applied in active)
+            for run in runs:
+                for changed in ({}, self._last[run]) if drives and run in self._last else ({},):
+                    asked[_key(run, p, changed)] = run, p, changed
+        missing = [key for key in asked if key not in self._kept][:_KEPT]
+        if len(missing) > 1:
+            answers = self._answers([asked[key] for key in missing])
+            for key, made in zip(missing, answers, strict=True):
+                if made is not None:
+                    self._kept[key] = made
 
     def _repeats(self, run: Run, p: Mapping[str, float]) -> None:
         """Refuse a simulator that answers one question in two ways: its noise would pass for physics."""
@@ -199,7 +229,9 @@ def build(case: Case, _: Path | None, code: CaseCode | None) -> PythonModel:
         return PythonModel(case, UserFunction(case).call)
     code.begin(handlers)
     return PythonModel(
-        case, apart(case, code, lambda run, name: _failed(case, run, f"no number in column {name!r}"))
+        case,
+        apart(case, code, lambda run, name: _failed(case, run, f"no number in column {name!r}")),
+        _many_apart(case, code),
     )
 
 
@@ -217,12 +249,55 @@ def apart(case: Case, code: CaseCode, failed: Callable[[Run, str], FitError]) ->
     return answer
 
 
+def _many_apart(case: Case, code: CaseCode) -> Answers:
+    """Return the answers to many questions of a simulator in a worker."""
+    names = [output.name for output in case.outputs]
+
+    def answers(questions: Sequence[Question]) -> list[Arrays | None]:
+        rows = [run.rows for run, _, _ in questions]
+        shapes: dict[str, tuple[int, ...]] = {name: (sum(rows),) for name in names}
+        sent = [(code.number(run), dict(p), dict(changed)) for run, p, changed in questions]
+        try:
+            made = code.arrays("calls", questions[0][0], {}, shapes, sent)
+        except FitError:  # whatever it is, the same question alone raises it by name
+            return [None] * len(questions)
+        parts = np.split(np.stack([made[name] for name in names]), np.cumsum(rows)[:-1], axis=1)
+        usable = [(np.abs(part) <= LARGEST).all() for part in parts]
+        return [
+            dict(zip(names, part, strict=True)) if good else None
+            for part, good in zip(parts, usable, strict=True)
+        ]
+
+    return answers
+
+
 def handlers(case: Case) -> Handlers:
     """Return what a worker answers of a simulator's function."""
     from toolkit.worker.serve import Numbers
 
     function, runs = UserFunction(case), (*case.runs, *case.predict)
-    return {"call": lambda run, p, changed: Numbers(function.call(runs[run], p, changed))}
+
+    def call(run: int, p: Mapping[str, float], changed: Mapping[str, Array]) -> Arrays:
+        return Numbers(function.call(runs[run], p, changed))
+
+    def calls(_: int, __: Mapping[str, float], questions: Sequence[tuple[int, Any, Any]]) -> Arrays:
+        parts = []
+        for run, p, changed in questions:
+            try:
+                parts.append(call(run, p, changed))
+            except FitError:
+                nothing = np.full(runs[run].rows, np.nan)
+                parts.append({output.name: nothing for output in case.outputs})
+        return Numbers(
+            {output.name: np.concatenate([part[output.name] for part in parts]) for output in case.outputs}
+        )
+
+    return {"call": call, "calls": calls}
+
+
+def _key(run: Run, p: Mapping[str, float], changed: Mapping[str, Array]) -> object:
+    inputs = tuple((name, blake2b(values.tobytes()).digest()) for name, values in changed.items())
+    return run, tuple(p.values()), inputs
 
 
 def _failed(case: Case, run: Run, got: str) -> FitError:
