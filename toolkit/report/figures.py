@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 import textwrap
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -40,10 +42,9 @@ def draw(plot: Plot) -> Picture:
 
     The margins are fixed fractions: measuring every text to trim them doubles the time.
     """
-    import matplotlib as mpl
     from PIL import Image
 
-    with mpl.rc_context(_RC):
+    with drawing_style():
         canvas: Any = _figure(plot).canvas
         canvas.draw()
         pixels = canvas.buffer_rgba()
@@ -57,29 +58,45 @@ def draw(plot: Plot) -> Picture:
 
 def draw_svg(plot: Plot) -> bytes:
     """Draw one figure as SVG, letters as outlines: the same data give the same file."""
-    import matplotlib as mpl
-
-    with mpl.rc_context(_RC | {"svg.hashsalt": "toolkit", "svg.fonttype": "path"}):
-        stream = io.BytesIO()
-        metadata: Any = {"Date": None}
-        _figure(plot).savefig(stream, format="svg", metadata=metadata)
-    return stream.getvalue()
+    with drawing_style():
+        return picture(_figure(plot), "svg")
 
 
 def figure_of(plot: Plot) -> Figure:
     """Return one figure as matplotlib holds it, before it is a picture: for a notebook."""
-    import matplotlib as mpl
-
-    with mpl.rc_context(_RC):
+    with drawing_style():
         return _figure(plot)
 
 
-def _figure(plot: Plot) -> Figure:
+@contextlib.contextmanager
+def drawing_style(**settings: object) -> Iterator[None]:
+    """Draw in the toolkit's style, whatever matplotlib is set to; ``settings`` are a figure's own."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_RC | settings):
+        yield
+
+
+def new_figure(size: tuple[float, float], **layout: Any) -> Figure:
+    """Return an empty figure of a size [in] that belongs to no window; ``layout`` as matplotlib has it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SIZE_IN, dpi=DPI)
+    figure = Figure(figsize=size, dpi=DPI, **layout)
     FigureCanvasAgg(figure)
+    return figure
+
+
+def picture(figure: Figure, kind: str) -> bytes:
+    """Return a figure as png, svg or pdf; the same data give the same file."""
+    stream = io.BytesIO()
+    undated: Any = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
+    figure.savefig(stream, format=kind, metadata=undated)
+    return stream.getvalue()
+
+
+def _figure(plot: Plot) -> Figure:
+    figure = new_figure(SIZE_IN)
     labels = {(c.label, c.group) for c in plot.curves if c.label}
     aside = bool(plot.legend_title) or len(labels) > 1
     foot = 0.20 if plot.names else 0.135
@@ -114,6 +131,8 @@ _RC: Any = {
     "axes.formatter.use_mathtext": False,
     "axes.unicode_minus": True,
     "path.simplify": True,
+    "svg.hashsalt": "toolkit",
+    "svg.fonttype": "path",
 }
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
 from toolkit.publication import write_result
-from toolkit.report.figures import COLOURS
+from toolkit.report.figures import COLOURS, drawing_style, new_figure, picture
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,15 +21,7 @@ if TYPE_CHECKING:
 MOST_PANELS = 12
 _COLUMNS = 3
 _GREY, _RED, _BLUE = "#6b6b6b", COLOURS[1], COLOURS[0]
-_RC: Any = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    # Texts of an SVG are drawn, and its ids do not depend on the run.
-    "svg.hashsalt": "toolkit",
-}
+_SETTINGS: Any = {"font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False}
 
 
 def panels(chart: Chart) -> tuple[Series, ...]:
@@ -43,16 +34,11 @@ def panels(chart: Chart) -> tuple[Series, ...]:
 
 def draw_chart(chart: Chart, kind: str) -> bytes:
     """Draw the charts as ``png`` or ``svg``."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     drawn = panels(chart)
     columns = min(_COLUMNS, len(drawn))
     rows = -(-len(drawn) // columns)
-    with mpl.rc_context(_RC):
-        figure = Figure(figsize=(max(4.4 * columns, 7.0), 3.5 * rows + 1.1), dpi=150)
-        FigureCanvasAgg(figure)
+    with drawing_style(**_SETTINGS):
+        figure = new_figure((max(4.4 * columns, 7.0), 3.5 * rows + 1.1))
         height = figure.get_figheight()
         outer = figure.add_gridspec(
             rows, columns, left=0.85 / figure.get_figwidth(), right=1 - 0.55 / figure.get_figwidth(),
@@ -75,9 +61,7 @@ def draw_chart(chart: Chart, kind: str) -> bytes:
             "(Nelson's number)",
             ha="center", va="center", fontsize=9, color=_GREY,
         )  # fmt: skip
-        stream = io.BytesIO()
-        figure.savefig(stream, format=kind, metadata={"Date": None} if kind == "svg" else None)
-    return stream.getvalue()
+        return picture(figure, kind)
 
 
 def whole_ticks(axis: Axis) -> None:
@@ -168,9 +152,7 @@ def write_figure(path: Path, budget: Budget, over_range: Sequence[Budget]) -> Pa
             expected=", ".join(FORMATS), next_step="choose a name with one of these endings",
             rule="output-name",
         )  # fmt: skip
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=(8.0, 3.6), layout="constrained")
+    drawing = new_figure((8.0, 3.6), layout="constrained")
     left, right = drawing.subplots(1, 2, width_ratios=(1.15, 1.0))
     parts = sorted(
         (component for component in budget.components if component.stated and component.u > 0),
@@ -198,7 +180,5 @@ def write_figure(path: Path, budget: Budget, over_range: Sequence[Budget]) -> Pa
     left.locator_params(axis="x", nbins=5)
     right.grid(visible=True, alpha=0.3)
     right.set_title("expanded uncertainty over the range", fontsize=10)
-    buffer = io.BytesIO()
-    drawing.savefig(buffer, format=path.suffix.lower()[1:], dpi=150)
-    write_result(path, buffer.getvalue())
+    write_result(path, picture(drawing, path.suffix.lower()[1:]))
     return path

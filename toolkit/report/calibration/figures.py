@@ -6,12 +6,11 @@ figure is made whole in memory first, so that a folder never holds half a set of
 
 from __future__ import annotations
 
-import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.report.figures import _RC, COLOURS, DPI
+from toolkit.report.figures import COLOURS, drawing_style, new_figure, picture
 from toolkit.units import printed
 
 if TYPE_CHECKING:
@@ -29,20 +28,20 @@ _NAMED = 5  # rows named in the influence figure
 
 def report_figures(report: FitReport, *, title: str) -> dict[str, bytes]:
     """Return the figures of a load by file name, PNG and SVG of each; ``title`` names record or session."""
-    files = {}
+    files: dict[str, bytes] = {}
     for name, (draw, caption) in _drawings(report).items():
-        for kind, data in _drawn(draw, f"{title}, {report.load}: {caption}").items():
-            files[f"{report.load}_{name}.{kind}"] = data
+        with drawing_style():
+            figure = _figure(draw, f"{title}, {report.load}: {caption}")
+            files |= {f"{report.load}_{name}.{kind}": picture(figure, kind) for kind in ("png", "svg")}
     return files
 
 
 def open_figures(report: FitReport, *, title: str) -> dict[str, Callable[[], Figure]]:
     """Return the same figures by name, each to be drawn when it is called: for a notebook."""
-    import matplotlib as mpl
 
     def drawing(draw: Callable[[Axes], None], what: str) -> Callable[[], Figure]:
         def open_figure() -> Figure:
-            with mpl.rc_context(_RC):
+            with drawing_style():
                 return _figure(draw, f"{title}, {report.load}: {what}")
 
         return open_figure
@@ -63,27 +62,8 @@ def _drawings(report: FitReport) -> dict[str, tuple[Callable[[Axes], None], str]
     return {name: (draw, caption) for name, draw, caption in drawings}
 
 
-def _drawn(draw: Callable[[Axes], None], title: str) -> dict[str, bytes]:
-    import matplotlib as mpl
-
-    # A fixed salt and no date: the same data give the same file.
-    with mpl.rc_context(_RC | {"svg.hashsalt": "toolkit", "svg.fonttype": "path"}):
-        figure = _figure(draw, title)
-        figures = {}
-        for kind in ("png", "svg"):
-            stream = io.BytesIO()
-            metadata: dict[str, Any] = {"Date": None} if kind == "svg" else {"Software": None}
-            figure.savefig(stream, format=kind, metadata=metadata)
-            figures[kind] = stream.getvalue()
-    return figures
-
-
 def _figure(draw: Callable[[Axes], None], title: str) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=_SIZE, dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(_SIZE, layout="constrained")
     axes = figure.add_subplot()
     axes.set_title(title, fontsize=10.5, loc="left")
     axes.grid(visible=True, color="#d9d9d9", linewidth=0.6)

@@ -5,7 +5,6 @@ Maps show how large the residual is over slip angle, load, condition, revolution
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.diagnosis.answer.locate import time_unit
+from toolkit.report.figures import drawing_style, new_figure, picture
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -24,17 +24,10 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.search.search import Search
 
 GREY, ORANGE, BLUE, GREEN, VIOLET = "#6b6b6b", "#d9822b", "#1565c0", "#2e7d32", "#6a3d9a"
-_RC: Any = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
-    "font.size": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "svg.hashsalt": "toolkit",
-}
+_SETTINGS: Any = {
+    "axes.spines.top": False, "axes.spines.right": False,
+    "axes.grid": True, "grid.color": "#e4e4e4", "grid.linewidth": 0.6,
+}  # fmt: skip
 _MOST = 1200  # points of a scatter
 _PIXELS = 700  # of a curve's width; in each the least and the largest value are drawn
 _FEW = 300  # rows of a run whose points stand apart
@@ -272,17 +265,10 @@ def binned(x: Array, y: Array, *, bins: int = _BINS) -> tuple[Array, Array]:
 
 def draw_svg(size: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
     """Return a figure that is drawn in the page's style, as SVG; the same input makes the same bytes."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure as MadeFigure
-
-    with mpl.rc_context(_RC):
-        figure = MadeFigure(figsize=size, layout="constrained")
-        FigureCanvasSVG(figure)
+    with drawing_style(**_SETTINGS):
+        figure = new_figure(size, layout="constrained")
         draw(figure)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    return stream.getvalue()
+        return picture(figure, "svg")
 
 
 _FIRST = ("SA", "SA_CMD", "FZ", "FZ_CMD")
