@@ -43,29 +43,41 @@ def noise_of(rows: Misfit, x: Array, *, alike: bool) -> Noise:
         r, columns = rows(x)[0, : len(rows.y)], np.zeros((0, len(rows.y)))
     effective_rows = float(np.count_nonzero(rows.weight > 1e-3 * rows.weight.max()))  # outliers are no rows
     freedom = max(effective_rows - len(rows.free), 1.0)
-    unlike, mean, sd, remaining = None, 1.0, np.ones(len(r)), freedom
+    channels = len(rows.channels)
+    time = _time(r, columns, channels)
+    unlike, mean, remaining = None, 1.0, freedom
     if not alike and float(r @ r) > 1e-26 * len(r):
         parts = rows.parts(x)
-        unlike = unlike_rows(r[None], columns[None], parts[None], own=len(rows.channels))
+        own = _unlike_their_neighbours(np.vstack([r, columns]), time, channels)
+        unlike = unlike_rows(own[None, 0], own[None, 1:], parts[None], own=channels)
         each = unlike.rows(parts[None])[0]
         mean = float(each.mean())
         sd = np.sqrt(each / mean)
         # tr(M V) for the mean variance of V.
         basis = np.linalg.qr(columns.T)[0]
         remaining = max(effective_rows - float(np.sum((basis * sd[:, None]) ** 2)), 1.0)
-    over = np.where(sd > 1e-6, 1.0 / np.maximum(sd, 1e-6), 0.0)
-    channels = len(rows.channels)
-    time = max(
-        autocorrelation_time(part, own)
-        for part, own in zip(
-            np.split(r * over, channels), np.split(columns * over, channels, axis=1), strict=True
-        )
-    )
+        over = np.where(sd > 1e-6, 1.0 / np.maximum(sd, 1e-6), 0.0)
+        time = max(time, _time(r * over, columns * over, channels))
     variance = max(float(r @ r) / remaining, 1e-26) * time
     return Noise(
         time=time, variance=variance, dof=max(effective_rows / time - len(rows.free), 1.0), unlike=unlike,
         mean=mean,
     )  # fmt: skip
+
+
+def _time(r: Array, columns: Array, channels: int) -> float:
+    return max(
+        autocorrelation_time(part, own)
+        for part, own in zip(np.split(r, channels), np.split(columns, channels, axis=1), strict=True)
+    )
+
+
+def _unlike_their_neighbours(series: Array, time: float, channels: int) -> Array:
+    # Series (k, rows x channels) without what an autoregression of this time says of the row before.
+    rho = (time - 1.0) / (time + 1.0)
+    own = np.array(np.split(series, channels, axis=1))
+    own[..., 1:] = (own[..., 1:] - rho * own[..., :-1]) / np.sqrt(1.0 - rho * rho)
+    return np.concatenate(list(own), axis=1)
 
 
 class Covariance:
@@ -104,11 +116,13 @@ class Covariance:
 
 
 def _dof(own: Array, noise: Noise) -> float:
-    # Satterthwaite's, of the mean relative variance of the parameters' variances (parts, parameters).
+    # Satterthwaite's, of the middle relative variance of the parameters' variances (parts, parameters).
     if noise.unlike is None:
         return noise.dof
     theta = noise.unlike.variances[0]
     share = own / np.where(theta > 0, theta, 1.0)[:, None]
     square = np.einsum("ki,kl,li->i", share, noise.unlike.covariance[0], share)
-    relative = float(np.mean(square / np.maximum(own.sum(axis=0) ** 2, 1e-300)))
-    return max(2.0 / relative / noise.time, 1.0) if relative > 0 else noise.dof
+    relative = float(np.median(square / np.maximum(own.sum(axis=0) ** 2, 1e-300)))
+    # The squares of an autoregression forget sooner than its rows.
+    time = (noise.time**2 + 1.0) / (2.0 * noise.time)
+    return max(2.0 / relative / time, 1.0) if relative > 0 else noise.dof

@@ -253,15 +253,16 @@ def _prune(misfit: Misfit, x: Array, noise: Noise, fixed: list[tuple[int, str]])
     # against the whole model, not against the last trial: many small rises would add up to a large one.
     from scipy.special import fdtri
 
+    factor = coverage_factor(noise.dof)
     survivors: set[int] = set()
     r = misfit(x)[0]
     total, rounding = float(r @ r), _EXACT * float(np.sum((misfit.y * misfit.weight) ** 2))
     while misfit.free:
         box = misfit.box()
-        every = Covariance(misfit, x, noise)
+        errors = np.sqrt(np.maximum(np.diag(Covariance(misfit, x, noise).alike), 0.0))
         allowed = np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
         bound = np.array(_at_bound(x[0], box))
-        excess = np.where(bound, 10.0, coverage_factor(every.dof) * every.errors / allowed)
+        excess = np.where(bound, 10.0, factor * errors / allowed)
         excess[[place in survivors for place in misfit.free]] = 0.0
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:

@@ -54,11 +54,12 @@ def diagnose(
     load: Array,
     up: NDArray[np.bool_] | None,
     replicates: NDArray[np.intp] | None = None,
+    loads: int = 1,
 ) -> Diagnostics:
     """Return the diagnostics of a solved load.
 
     ``cells`` (rows, indications), ``load`` (rows,), ``up`` (rows,) where the direction is known;
-    ``replicates`` as of `replicate_groups`, where they are known already.
+    ``replicates`` as of `replicate_groups`, where they are known already; ``loads`` that the session has.
     """
     n, p = len(load), len(fit.terms)
     w = None if fit.weights is None else np.sqrt(fit.weights)
@@ -88,7 +89,7 @@ def diagnose(
         apart=external,
         cook=internal**2 * (h / (p * complement)),
         press=float(np.sqrt(inner(deleted, deleted) / n)),
-        outliers=() if quiet or dof < 2 else _outliers(external, dof - 1),
+        outliers=() if quiet or dof < 2 else _outliers(external, dof - 1, loads),
         reversibility=_reversibility(fit.residuals, up),
         lack_of_fit=None if quiet else _lack_of_fit(fit, cells, load, replicates),
         heteroscedasticity=None if quiet or n < 10 else _breusch_pagan(e, load),
@@ -122,11 +123,11 @@ def replicate_groups(rows: Array) -> NDArray[np.intp]:
     return groups
 
 
-def _outliers(external: Array, dof: int) -> tuple[int, ...]:
-    # Bonferroni: the risk that any row of a clean session is named is OUTLIER_RISK.
+def _outliers(external: Array, dof: int, loads: int) -> tuple[int, ...]:
+    # Bonferroni: the risk that any row of a clean session is named in any of its loads is OUTLIER_RISK.
     from scipy.special import stdtrit
 
-    limit = stdtrit(dof, 1 - OUTLIER_RISK / (2 * len(external)))
+    limit = stdtrit(dof, 1 - OUTLIER_RISK / (2 * loads * len(external)))
     return tuple(int(i) + 1 for i in np.flatnonzero(np.abs(external) > limit))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,7 +255,15 @@ def _result(
         chi2_within=None if noise is None or not noise.stated else noise.chi2(fit.residuals - of_runs),
         stated=None if noise is None or not noise.stated else noise.size,
         diagnostics=_diagnosed(
-            fit, of_runs, noise, cells=cells, load=load, up=table.up, groups=groups, exact=exact
+            fit,
+            of_runs,
+            noise,
+            cells=cells,
+            load=load,
+            up=table.up,
+            groups=groups,
+            exact=exact,
+            loads=len(session.loads),
         ),
         llf=max(LLF_FACTOR * fit.residual_sd, _resolution(session, fit)),
         check_residuals=check_residuals,
@@ -287,13 +296,15 @@ def _diagnosed(
     up: NDArray[np.bool_] | None,
     groups: NDArray[np.intp],
     exact: bool,
+    loads: int,
 ) -> Diagnostics:
-    diagnostics = diagnose(fit, cells=cells, load=load, up=up, replicates=groups)
+    judged = partial(diagnose, cells=cells, load=load, up=up, replicates=groups, loads=loads)
+    diagnostics = judged(fit)
     if exact:
         return dataclasses.replace(diagnostics, outliers=(), lack_of_fit=None, heteroscedasticity=None)
     if not of_runs.any():
         return diagnostics
-    within = diagnose(within_runs(fit, of_runs, noise), cells=cells, load=load, up=up, replicates=groups)
+    within = judged(within_runs(fit, of_runs, noise))
     return dataclasses.replace(
         diagnostics,
         apart=within.external,
