@@ -98,7 +98,7 @@ def _correlated(columns: Array, where: Layout, noise: Autoregression) -> Array:
     return products
 
 
-_OUTER = 4  # times that the noise is estimated anew
+_OUTER = 5  # times that the noise is estimated anew, the first roughly
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
 _MARGIN = 0.5  # of what tells that noise has absorbed physics: nearer to it than that, both are fitted
 _ROUGH = 1e-3  # of the squares: a first round that leads no farther is good enough to see the noise
