@@ -11,6 +11,7 @@ import os
 import sys
 import threading
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -97,6 +98,16 @@ if can_fork():
 
 remember_fits()
 
+
+def _flushed(handle: Any) -> None:
+    os.fstat(handle if isinstance(handle, int) else handle.fileno())
+
+
+# What is written is flushed to the disk before it is named, and tests of the registry write by the thousand:
+# each waited for the disk, which the other worker holds up too. No test sees whether bytes are on a disk or
+# about to be. `tests/crash` kills processes of their own, which flush, at each such call.
+os.fsync = _flushed
+
 # The many processes that tests start, and the next run, load compiled modules, whatever the environment says.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -175,15 +186,20 @@ def virtual_record(virtual_plan: Plan) -> CalibrationRecord:
 @pytest.fixture(scope="session")
 def virtual_test(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan) -> Path:
     """A virtual test as files; read it, never write into it."""
+    return _test_of(virtual_plan, "virtual", tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def virtual_repeat(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan) -> Path:
+    """The same tire tested again, with other noise; read it, never write into it."""
+    return _test_of(replace(virtual_plan, seed=7), "repeat", tmp_path_factory)
+
+
+def _test_of(plan: Plan, name: str, factory: pytest.TempPathFactory) -> Path:
     from toolkit.simulation.run import simulate
     from toolkit.simulation.write import write_test
 
-    return (
-        built_once(
-            tmp_path_factory, "virtual", lambda folder: write_test(simulate(virtual_plan), folder / "test")
-        )
-        / "test"
-    )
+    return built_once(factory, name, lambda folder: write_test(simulate(plan), folder / "test")) / "test"
 
 
 @pytest.fixture(scope="session")

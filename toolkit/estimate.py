@@ -39,6 +39,14 @@ class Estimate:
         k = coverage_factor(self.dof, probability)
         return k * self.u, k
 
+    def as_dict(self) -> dict[str, float | str]:
+        """Return it as the answers have it, with its expanded uncertainty."""
+        U, k = self.expanded()
+        return {
+            "value": self.value, "standard_uncertainty": self.u, "dof": self.dof, "expanded_uncertainty": U,
+            "k": k, "unit": self.unit,
+        }  # fmt: skip
+
     def scaled(self, factor: float, unit: str) -> Estimate:
         """Return the estimate times an exact factor, in another unit."""
         return Estimate(value=self.value * factor, u=self.u * abs(factor), unit=unit, dof=self.dof)

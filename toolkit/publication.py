@@ -360,18 +360,19 @@ def _check_names(stage: Path, target: Path) -> None:
     names: dict[str, Path] = {}
     for result in result_files(stage):
         for path in (result, *result.parents[:-1]):
-            namesake = names.setdefault(_caseless(path), path)
+            namesake = names.setdefault(caseless(path), path)
             if namesake != path:
                 raise FileExistsError(errno.EEXIST, f"{namesake} and {path} differ by case alone")
     for folder in {path.parent for path in names.values()}:
         for entry in (target / folder).iterdir() if (target / folder).is_dir() else ():
             path = folder / entry.name
-            namesake = names.get(_caseless(path), path)
+            namesake = names.get(caseless(path), path)
             if namesake != path and same_file(target / namesake, entry):
                 raise FileExistsError(errno.EEXIST, f"{path} is there, and {namesake} would replace it")
 
 
-def _caseless(path: Path) -> str:
+def caseless(path: Path | str) -> str:
+    """Return a name as a file system that tells no case compares it."""
     return unicodedata.normalize("NFC", str(path)).casefold()
 
 

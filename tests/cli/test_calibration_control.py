@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 import typer
 
 from tests import commands
+from tests.built_once import built_once
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
@@ -42,15 +44,19 @@ def session(folder: Path, year: int, error: float) -> Path:
     return path
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A registry of seven sessions; the newest check load is far off those before it."""
-    registry = Registry(tmp_path / "cal")
+def _seven_years(home: Path) -> None:
+    registry = Registry(home / "cal")
     for at, error in enumerate((0.0, 0.1, -0.1, 0.05, -0.05, 0.1, 0.8)):
-        made = calibrate(session(tmp_path / f"s{at}", 2018 + at, error), registry)
+        made = calibrate(session(home / f"s{at}", 2018 + at, error), registry)
         if at == 0:
             approve(registry, made.record.id, in_force_from=dt.date(2018, 3, 1), checked_by="B")
-    return registry.folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A registry of seven sessions; the newest check load is far off those before it."""
+    seven_years = built_once(tmp_path_factory, "seven-years", _seven_years)
+    return Path(shutil.copytree(seven_years / "cal", tmp_path / "cal"))
 
 
 @pytest.fixture

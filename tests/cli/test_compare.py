@@ -161,14 +161,8 @@ def test_against_a_maker_s_characteristics(virtual_test: Path, tmp_path: Path) -
 
 
 @pytest.mark.usefixtures("read_once")
-def test_repeats_have_their_precision(virtual_test: Path, tmp_path: Path, virtual_plan: Any) -> None:
-    import dataclasses
-
-    from toolkit.simulation.run import simulate
-    from toolkit.simulation.write import write_test
-
-    again = tmp_path / "again"
-    write_test(simulate(dataclasses.replace(virtual_plan, seed=7)), again)
+def test_repeats_have_their_precision(virtual_test: Path, virtual_repeat: Path, tmp_path: Path) -> None:
+    again = Path(shutil.copytree(virtual_repeat, tmp_path / "again"))
     toml = again / "test.toml"
     toml.write_text(
         toml.read_text()

@@ -6,7 +6,6 @@ Beside these every answer that any test asks a command for is held to its declar
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -22,9 +21,6 @@ from toolkit.cli.main import command_tree, run
 from toolkit.cli.options import Json, Output, RegistryOptions
 from toolkit.declared.answers import answer_schema, tables_of
 from toolkit.lab.home import packaged_home
-from toolkit.simulation.plan import Plan
-from toolkit.simulation.run import simulate
-from toolkit.simulation.write import write_test
 from toolkit.version import __version__
 
 CALIBRATIONS = packaged_home() / "calibrations"
@@ -124,13 +120,11 @@ def test_what_a_command_prints_is_what_is_declared(
 
 
 def test_fit_and_compare_print_what_is_declared(
-    virtual_test: Path, virtual_plan: Plan, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    virtual_test: Path, virtual_repeat: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    again = tmp_path / "again"
-    write_test(simulate(dataclasses.replace(virtual_plan, seed=virtual_plan.seed + 1)), again)
     for command, words in (
         ("fit", (virtual_test, "--model", "magic_formula", "--model", "tmeasy")),
-        ("compare", (virtual_test, again)),
+        ("compare", (virtual_test, virtual_repeat)),
         ("process", (virtual_test,)),
     ):
         printed = ask(capsys, command, *words, registry=CALIBRATIONS)

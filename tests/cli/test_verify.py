@@ -14,6 +14,7 @@ from tests import commands
 from tests.trust.seal.authority import make_authority
 from tests.trust.seal.seal_factory import authority, flipped, key, plain_pdf, sealed_pdf
 from toolkit.files import sha256_bytes
+from toolkit.lab.signatures.proofs import statements_hash
 from toolkit.trust.seal.pdf import seal_pdf
 from toolkit.trust.seal.xml import seal_xml
 
@@ -38,10 +39,13 @@ def run(home: Path) -> Run:
     return lambda *words: commands.answer("verify", *words, "--home", home)
 
 
-def _issued(record: str, sha256: str, files: dict[str, bytes] | None = None) -> bytes:
+def _issued(
+    record: str, sha256: str, files: dict[str, bytes] | None = None, manifest: dict[str, Any] | None = None
+) -> bytes:
     listed = [{"name": name, "sha256": sha256_bytes(data)} for name, data in (files or {}).items()]
     proof = {"schema": 1, "document": f"certificate of {record}", "files": listed,
              "records": [{"id": record, "sha256": sha256}]}  # fmt: skip
+    proof |= {} if manifest is None else {"manifest": statements_hash(manifest)}
     attachments = {"toolkit.json": json.dumps(proof).encode()}
     return seal_pdf(plain_pdf(), key(), reason="issued", attachments=attachments)
 
@@ -97,6 +101,19 @@ ALTERED: dict[str, Callable[[str], str]] = {
     "one key more": lambda text: text.replace('{\n "content"', '{\n "approved": true,\n "content"', 1),
     "a space": lambda text: text + " ",
 }
+
+
+@pytest.mark.parametrize("gone", [False, True])
+def test_the_home_s_own_file_of_which_a_byte_differs_is_invalid(run: Run, home: Path, gone: bool) -> None:
+    path = next((home / "calibrations").rglob("m15-virtual-r1.json"))
+    file = path.with_name("copy.json") if gone else path
+    changed = path.read_bytes() + b" "
+    if gone:
+        path.unlink()
+    file.write_bytes(changed)
+    code, answer = run(file)
+    assert (code, answer["signature"]) == (2, "invalid"), answer["why"]
+    assert "it is not the file of m15-virtual-r1 that was entered" in answer["why"]
 
 
 @pytest.mark.parametrize("name", ALTERED)
@@ -199,8 +216,13 @@ def test_a_manifest_holds_its_files_and_is_proved_by_their_pdf(run: Run, home: P
         (tmp_path / "manifest.json").write_text(json.dumps({"schema": 1, "outputs": outputs}))
         return tmp_path / "manifest.json"
 
+    said = {"schema": 1}
     assert run(write(pdf))[1]["signature"] == "unsigned"
-    sealed = _issued("m15-virtual-r1", _sha256(home, "m15-virtual-r1"), {"r.docx": word})
+    of_older_version = _issued("m15-virtual-r1", _sha256(home, "m15-virtual-r1"), {"r.docx": word})
+    code, answer = run(write(of_older_version))
+    assert (code, answer["signature"]) == (1, "unsigned")
+    assert "r.pdf proves the files that it lists, and nothing else that it says" in answer["why"]
+    sealed = _issued("m15-virtual-r1", _sha256(home, "m15-virtual-r1"), {"r.docx": word}, said)
     code, answer = run(write(sealed))
     assert (code, answer["kind"], answer["signature"]) == (0, "manifest", "valid")
     assert run(write(_issued("m15-virtual-r1", _sha256(home, "m15-virtual-r1"))))[0] == 1

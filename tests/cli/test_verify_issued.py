@@ -312,6 +312,16 @@ def test_an_issued_report_says_the_day_of_its_test_to_whoever_verifies_it(
         code, verdict = commands.answer("verify", tmp_path / "out" / name, "--home", home)
         assert (code, verdict["signature"], verdict["still_holds"]) == (0, "valid", True), verdict
         assert "in force on 2026-03-17, the day of the test" in verdict["why"]
+    manifest = tmp_path / "out" / "manifest.json"
+    stated = json.loads(manifest.read_text())
+    changes = {"simulated": False, "inputs": [], "tested": "2026-04-17", "calibrations": [], "ledger": None}
+    outputs = [{**output, "bytes": output["bytes"] + 1} for output in stated["outputs"]]
+    for name, value in {**changes, "outputs": outputs, "approved": "yes"}.items():
+        manifest.write_text(json.dumps({**stated, name: value}))
+        code, verdict = commands.answer("verify", manifest, "--home", home)
+        assert (code, verdict["signature"]) == (2, "invalid"), (name, verdict)
+    manifest.write_text(json.dumps(stated))  # other white space says the same
+    assert commands.answer("verify", manifest, "--home", home)[0] == 0
 
 
 def test_who_may_not_issue_leaves_nothing(issued: Issued) -> None:

@@ -70,7 +70,7 @@ def test_an_amplitude_can_be_off_and_a_width_is_positive():
 
 @pytest.mark.parametrize(
     "name",
-    ["law adds: open(a)", "law takes: a", "law ", "law enters: a*lag([itself], tau)"],
+    ["law adds: open(a)", "law takes: a", "law ", "law enters: a*loop([itself], reach)"],
 )
 def test_what_is_no_law_is_refused(name):
     with pytest.raises(ConfigError) as caught:

@@ -10,10 +10,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tests.house import citations, structure, words
+from tests.house import citations, structure, weight, words
 from tests.house.source import ROOT, Module, read_package
 
-LISTS = ("commands", "effects", "arrows", "pages", "once")
+LISTS = ("commands", "effects", "arrows", "pages", "once", "twice", "alone")
+
+_HEAVIEST = 10
 
 
 def measure(root: Path = ROOT) -> dict[str, Any]:
@@ -22,7 +24,7 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
     graph = structure.import_graph()
     total, longest = words.share_of(modules), structure.largest(modules)
     worst = sorted(modules, key=lambda module: -words.share_of([module]).vague)[:15]
-    effects = citations.effects_named(modules)
+    effects, twice = citations.effects_named(modules), weight.written_twice(modules)
     return {
         "schema": 1,
         "lines": sum(len(module.lines) for module in modules),
@@ -55,6 +57,9 @@ def measure(root: Path = ROOT) -> dict[str, Any]:
         "imported_once": [
             {"module": module, "importer": importer} for module, importer in structure.imported_once(graph)
         ],
+        "uncalled": weight.uncalled(modules, root),
+        "written_twice": {"lines": weight.repeated_lines(twice), "functions": twice},
+        "needed_by_one": [dataclasses.asdict(row) for row in weight.needed_by_one(modules)],
     }
 
 
@@ -86,10 +91,17 @@ def text_of(figures: dict[str, Any]) -> str:
           for room, arrows in figures["arrows_up"].items()),
         ("pages cited that do not exist", f"{len(figures['pages_missing'])}", "0"),
         ("modules imported from one place", f"{len(figures['imported_once'])}", ""),
+        ("functions that nobody calls", f"{len(figures['uncalled'])}", "0"),
+        ("lines of functions written twice", f"{figures['written_twice']['lines']}", "0"),
     ]  # fmt: skip
     rows += [f"{title:<36}{value}" + (f"  (aim {aim})" if aim else "") for title, value, aim in aims]
     rows += ["", "commonest  " + ", ".join(f"{name} {count}" for name, count in names["commonest"].items())]
     rows += [f"{row['vague']:>5}{row['percent']:>7.1f} %  {row['module']}" for row in names["worst"]]
+    rows += ["", "lines and modules that the commands of one module alone need"]
+    rows += [
+        f"{row['lines']:>6}{row['modules']:>5}  {row['command']}"
+        for row in figures["needed_by_one"][:_HEAVIEST]
+    ]
     return "\n".join(rows)
 
 
@@ -113,6 +125,8 @@ def _list_text(figures: dict[str, Any], figure: str) -> str:
         "arrows": [arrow for arrows in figures["arrows_up"].values() for arrow in arrows],
         "pages": figures["pages_missing"],
         "once": figures["imported_once"],
+        "twice": ["\t".join(places) for places in figures["written_twice"]["functions"]],
+        "alone": figures["needed_by_one"],
     }[figure]
     return "\n".join(row if isinstance(row, str) else "\t".join(map(str, row.values())) for row in rows)
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.house import __main__ as house
-from tests.house import citations, structure, words
+from tests.house import citations, structure, weight, words
 from tests.house.__main__ import main, names_text
 from tests.house.source import ROOT, Module, read_module, read_package
 
@@ -23,6 +23,8 @@ LIMITS = {
     "imports up in report": 0,
     "imports up in diagnosis": 0,
     "pages cited that do not exist": 0,
+    "functions that nobody calls": 0,
+    "lines of functions written twice": 27,
 }
 
 
@@ -41,6 +43,8 @@ def test_no_figure_rises_above_its_limit(figures: dict[str, Any]) -> None:
         "effects named outside their file": len(figures["effects_named_outside"]["mentions"]),
         **{f"imports up in {room}": len(arrows) for room, arrows in figures["arrows_up"].items()},
         "pages cited that do not exist": len(figures["pages_missing"]),
+        "functions that nobody calls": len(figures["uncalled"]),
+        "lines of functions written twice": figures["written_twice"]["lines"],
     }
     assert today.keys() == LIMITS.keys()
     assert {name: value for name, value in today.items() if value > LIMITS[name]} == {}
@@ -247,3 +251,63 @@ def test_json_holds_what_the_text_counts(
 def test_a_module_knows_its_place() -> None:
     module = read_module(ROOT / "tests" / "house" / "__init__.py")
     assert (module.name, module.layer, module.is_sliver) == ("tests.house", "house", True)
+
+
+CALLS = '''
+def used(lines, width):
+    """Return what is called by its name."""
+    rows = [line.strip()[:width] for line in lines if line.strip()]
+    count = len(rows) + sum(len(row) for row in rows)
+    return "; ".join(sorted(rows)), count
+
+
+def left_over(texts, most):
+    """Return the same of other things, for nobody."""
+    cells = [text.strip()[:most] for text in texts if text.strip()]
+    total = len(cells) + sum(len(cell) for cell in cells)
+    return ", ".join(sorted(cells)), total
+
+
+class Plain:
+    def asked(self):
+        return used([], 1)
+
+    def __call__(self):
+        return self.asked()
+
+
+class Derived(Plain):
+    def called_by_the_base(self):
+        return 1
+
+
+@register
+def registered():
+    return 2
+'''
+
+
+def test_what_nobody_calls_and_what_is_written_twice_are_told(tmp_path: Path) -> None:
+    modules = write(tmp_path, {"__init__": "", "calls": CALLS})
+    assert weight.uncalled(modules, tmp_path) == ["toolkit.calls.left_over"]
+    groups = weight.written_twice(modules)
+    assert groups == [["toolkit.calls.used:5", "toolkit.calls.left_over:5"]]
+    assert weight.repeated_lines(groups) == 5
+
+
+def test_what_one_command_alone_leads_to_is_its_weight(tmp_path: Path) -> None:
+    lazily = "def command():\n    from toolkit.planner import search\n    return search\n"
+    files = {
+        "__init__": "", "cli/__init__": "", "shared": "x = 1\n", "planner/__init__": "",
+        "planner/search": 'from importlib import import_module\nfrom toolkit.shared import x\n'
+        'import_module(f"{__name__}.{x}")\nimport_module(f"toolkit.kinds.{x}")\nimport_module(x)\n',
+        "kinds/__init__": "", "kinds/one": "a = 1\nb = 2\n", "kinds/two": "c = 3\n",
+        "cli/plan": lazily, "cli/options": "from toolkit.planner import search\n",
+        "cli/fit": "from typing import TYPE_CHECKING\nfrom toolkit.cli import options\n"
+        "from toolkit.shared import x\nif TYPE_CHECKING:\n    from toolkit.planner import search\n",
+    }  # fmt: skip
+    rows = weight.needed_by_one(write(tmp_path, files))
+    assert rows == [
+        weight.Weight("toolkit.cli.plan", lines=11, modules=4),
+        weight.Weight("toolkit.cli.fit", lines=5, modules=1),
+    ]

@@ -1,8 +1,7 @@
 """Terms of a calibration equation: names such as ``D51``, ``D51^2``, ``D51*E5``, ``abs(D51)``.
 
 A term is a product of powers and absolute values of indications. The same text names it in sessions,
-records, tables and JSON, and the same function evaluates it on arrays and on exact rationals. The digits in
-which its coefficient is issued follow from how far the term reaches.
+records, tables and JSON, and the same function evaluates it on arrays and on exact rationals.
 """
 
 from __future__ import annotations
@@ -22,8 +21,6 @@ from toolkit.errors import SessionError
 INTERCEPT = "intercept"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _FACTOR = re.compile(r"(?:(?P<name>[A-Za-z]\w*)(?:\^(?P<power>[1-9]))?|abs\((?P<abs>[A-Za-z]\w*)\))\Z")
-_FEWEST_DIGITS = 5
-_ROUNDING = 1e-5  # of the largest load
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,22 +159,6 @@ def term_slopes(terms: Sequence[str], coefficients: Any, columns: Mapping[str, A
                 product = product if k == i else product * value
             slopes[name] = slopes[name] + product
     return slopes
-
-
-def issued_value(coefficient: float, extent: float, largest: float) -> float:
-    """Return a coefficient in as few digits as its use allows, at least five.
-
-    ``extent`` is the largest absolute value of its term in the session, ``largest`` the largest load: the
-    rounding may move a load by at most 1e-5 of the largest.
-
-    >>> issued_value(0.997193821, 500.0, 500.0)
-    0.99719
-    """
-    for digits in range(_FEWEST_DIGITS, 17):
-        value = float(f"{coefficient:.{digits}g}")
-        if abs(value - coefficient) * extent <= _ROUNDING * largest:
-            return value
-    return coefficient
 
 
 def term_reach(terms: Array, has_constant: bool) -> Array:

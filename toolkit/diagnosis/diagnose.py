@@ -33,6 +33,7 @@ from toolkit.diagnosis.law.learn import Laws, learned
 from toolkit.diagnosis.law.resembling import with_resemblances
 from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations, without_untested
 from toolkit.diagnosis.policy import BUDGET
+from toolkit.diagnosis.search.between_rows import with_readings_between_rows
 from toolkit.diagnosis.search.parameters_alike import with_parameters_alike
 from toolkit.diagnosis.search.run_parameters import with_disagreement
 from toolkit.diagnosis.search.search import Search, search
@@ -148,6 +149,7 @@ def _diagnosed(
                 outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
                 outcome = without_untested(outcome, laws)
                 laws = with_resemblances(outcome, laws, budget)
+                outcome = with_readings_between_rows(outcome)
                 outcome = with_parameters_alike(outcome)
                 outcome = with_disagreement(outcome, laws.held_out, budget)
             answer = answer_of(posed.case, outcome, laws, findings)

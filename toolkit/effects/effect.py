@@ -220,6 +220,11 @@ class Effect:
         return self.second == "record"
 
     @property
+    def reads_between_rows(self) -> bool:
+        """It shows what a channel did between two rows."""
+        return self.on_channel is not None and self.on_channel.between_rows
+
+    @property
     def misleads(self) -> bool:
         """Parameters refitted without it may have gone where it no longer helps."""
         return self.reshapes or self.discrete

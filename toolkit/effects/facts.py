@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
+    from toolkit.effects.law import Formula
     from toolkit.effects.signals import Setting
     from toolkit.effects.surroundings import Surroundings
 
@@ -15,8 +16,6 @@ Values = Mapping[str, float]
 Channels = Mapping[str, "Array"]
 # (position, velocity, parameters) -> force-like term against the motion, of the arrays' shape or scalars
 ForceHook = Callable[[Any, Any, Values], Any]
-# (signals by name, parameters) -> force-like term against the motion, of the signals' shape or scalars
-LawHook = Callable[[Mapping[str, Any], Values], Any]
 # (time, velocity, parameters) -> the same term along a recorded motion, of a force that has a memory
 RecordedHook = Callable[["Array", "Array", Values], "Array"]
 # (state, its spread, parameters) -> share of a rising rate that is left, of the arrays' shape or scalars
@@ -77,7 +76,7 @@ class ChannelFacts:
 class Term:
     """A term of an equation of motion, and what is declared of it.
 
-    ``of`` is what it depends on. ``law`` is a term of any states, inputs and the time, which ``reads`` names.
+    ``of`` is what it depends on. ``law`` is a term of any states, inputs and the time.
     ``on_place`` says of a term of the position that it may also enter the
     equation of a state that is a place itself. ``drives`` says that it is told as it stands in the equation
     of its own output, and not as a resistance. ``spill`` names the parameter that says which share of what a
@@ -88,8 +87,7 @@ class Term:
 
     of: Literal["nothing", "velocity", "position", "state"]
     force: ForceHook | None = None
-    law: LawHook | None = None
-    reads: tuple[str, ...] = ()
+    law: Formula | None = None
     recorded: RecordedHook | None = None
     limit: LimitHook | None = None
     bristle: BristleHook | None = None

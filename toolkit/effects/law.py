@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 _LONGEST = 2_000  # characters: a formula that a person reads has fewer than a hundred
 _LARGEST_POWER = 9
 _LEAST = 0.05  # of a tire's friction or stiffness
+_SHORTEST = 1e-12  # of a lag [s]
 _SIGNAL = re.compile(r"\[([^\[\]]+)\]")
 _INSIDE = "__"  # what stands for a bracket while Python's parser reads the rest; no parameter begins so
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -127,7 +128,7 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
     return np.asarray(np.interp(t, even, (w**2 / (first - second) * answered).real))
 
 
-def _way(t: Array, x: Array) -> Array:
+def way(t: Array, x: Array) -> Array:
     """Return the integral of a signal over the time from the first row on: the way of a speed."""
     return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (x[1:] + x[:-1]))])
 
@@ -138,29 +139,66 @@ def _loop(_: Array, x: Array, reach: float) -> Array:
 
 
 _WITH_MEMORY: dict[str, Callable[..., Any]] = {
-    "lag": lag, "rate": _rate, "mode": _mode, "loop": _loop, "way": _way,
+    "lag": lag, "rate": _rate, "mode": _mode, "loop": _loop, "way": way,
 }  # fmt: skip
+_OF_STATES = frozenset({"lag", "mode"})
+"""What remembers by states of its own, as an equation can have them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Remembered:
+    """An operator with a memory in an equation: states of its own, of which the first is its value.
+
+    ``key`` is the signal by which its formula reads that value; ``argument`` and ``shape`` are what it
+    follows and the parameters by which it does.
+    """
+
+    key: str
+    function: str
+    argument: Part
+    shape: tuple[Part, ...]
+
+    @property
+    def states(self) -> int:
+        """How many they are."""
+        return {"lag": 1, "mode": 2}[self.function]
+
+    def start(self, signals: Mapping[str, Any], values: Mapping[str, float]) -> list[Any]:
+        """Return the states at rest with what they follow."""
+        return [self.argument(signals, values, None), 0.0][: self.states]
+
+    def sizes(self, of: float, values: Mapping[str, float]) -> list[float]:
+        """Return sizes of its states by that of what they follow."""
+        if self.function == "lag":
+            return [of]
+        return [of, of * 2 * math.pi * float(np.max(self.shape[0]({}, values, None)))]
+
+    def rates(self, own: Array, signals: Mapping[str, Any], values: Mapping[str, float]) -> list[Any]:
+        """Return the rates of its states, which are (states, ...)."""
+        away = self.argument(signals, values, None) - own[0]
+        shape = [part(signals, values, None) for part in self.shape]
+        if self.function == "lag":
+            return [away / np.maximum(shape[0], _SHORTEST)]
+        frequency, damping = shape
+        w = 2 * math.pi * frequency
+        return [own[1], w * (w * away - 2 * damping * own[1])]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Formula:
-    """A formula that was read: its text, signals and parameters in their order, and whether it remembers."""
+    """A formula that was read: its text, signals and parameters in their order, and what it remembers."""
 
     text: str
     signals: tuple[str, ...]
     parameters: tuple[str, ...]
     functions: frozenset[str]
     whole: Part
+    remembered: tuple[Remembered, ...] = ()
 
     @property
     def in_time(self) -> bool:
         """Tell whether time passes in it."""
         return "time" in self.signals or bool(self.functions & {"lag", "rate", "mode", "way"})
-
-    @property
-    def has_memory(self) -> bool:
-        """Tell whether a row depends on the rows before it."""
-        return bool(self.functions & set(_WITH_MEMORY))
 
     def plain(self, itself: str | None = None) -> str:
         """Return it as people read it: without brackets, what it acts on by its name.
@@ -175,12 +213,18 @@ class Formula:
     def __call__(
         self, signals: Mapping[str, Any], values: Mapping[str, float], t: Array | None = None
     ) -> Any:
-        """Return its value at signals of one shape; ``t`` [s] is needed where it remembers."""
+        """Return its value at signals of one shape.
+
+        Where it remembers, ``t`` [s] is needed, or among the signals the values of what it remembers.
+        """
         return self.whole(signals, values, t)
 
 
-def _part(node: ast.expr, listed: tuple[str, ...]) -> Part:
-    """Return a part of a formula as a function of signals, parameters and time: an equation asks it often."""
+def _part(node: ast.expr, listed: tuple[str, ...], remembered: list[Remembered]) -> Part:
+    """Return a part of a formula as a function of signals, parameters and time: an equation asks it often.
+
+    What has a memory is added to ``remembered``.
+    """
     if isinstance(node, ast.Constant):
         number = node.value
         return lambda _, __, ___: number
@@ -191,18 +235,25 @@ def _part(node: ast.expr, listed: tuple[str, ...]) -> Part:
             return lambda signals, _, __: signals[signal]
         return (lambda _, __, ___: math.pi) if name == "pi" else (lambda _, values, __: values[name])
     if isinstance(node, ast.UnaryOp):
-        positive = _part(node.operand, listed)
+        positive = _part(node.operand, listed, remembered)
         return lambda signals, values, t: -positive(signals, values, t)
     if isinstance(node, ast.BinOp):
         combined = _BINARY[type(node.op)]
-        left, right = _part(node.left, listed), _part(node.right, listed)
+        left, right = (_part(side, listed, remembered) for side in (node.left, node.right))
         return lambda signals, values, t: combined(left(signals, values, t), right(signals, values, t))
     assert isinstance(node, ast.Call)  # noqa: S101  `formula` lets nothing else pass
     assert isinstance(node.func, ast.Name)  # noqa: S101
-    called, parts = node.func.id, [_part(argument, listed) for argument in node.args]
+    called, parts = node.func.id, [_part(argument, listed, remembered) for argument in node.args]
     if called in _WITH_MEMORY:
-        remembering = _WITH_MEMORY[called]
-        return lambda signals, values, t: remembering(t, *(part(signals, values, t) for part in parts))
+        remembering, key = _WITH_MEMORY[called], f"{called} {len(remembered)}"
+        remembered.append(Remembered(key, called, parts[0], tuple(parts[1:])))
+
+        def recalled(signals: Mapping[str, Any], values: Mapping[str, float], t: Any) -> Any:
+            if key in signals:
+                return signals[key]
+            return remembering(t, *(part(signals, values, t) for part in parts))
+
+        return recalled
     function = _STATIC[called]
     return lambda signals, values, t: function(*(part(signals, values, t) for part in parts))
 
@@ -242,7 +293,9 @@ def formula(text: str) -> Formula:
             parameters[node.id] = None
     _check(tree, text)
     ordered = sorted(parameters, key=lambda name: re.search(rf"\b{name}\b", source).start())  # type: ignore[union-attr]
-    return Formula(text, listed, tuple(ordered), frozenset(functions), _part(tree, listed))
+    remembered: list[Remembered] = []
+    whole = _part(tree, listed, remembered)
+    return Formula(text, listed, tuple(ordered), frozenset(functions), whole, tuple(remembered))
 
 
 def _check(node: ast.AST, text: str) -> None:
@@ -320,11 +373,14 @@ def law_effect(name: str) -> Effect:
         scales
     """
     acts, law = parts_of(name)
-    refused = {"enters": law.has_memory} | dict.fromkeys(SCALED, ITSELF in law.signals)
+    refused = {"enters": bool(law.functions & set(_WITH_MEMORY) - _OF_STATES)} | dict.fromkeys(
+        SCALED, ITSELF in law.signals
+    )
     if refused.get(acts):
         raise ConfigError(
             f"a law cannot act so: it {acts}", where=name[:200], got=law.plain(),
-            expected="a formula of states, inputs and the time without memory" if acts == "enters"
+            expected="a formula of states, inputs and the time, that remembers as a lag or a mode does"
+            if acts == "enters"
             else "a formula of recorded channels and the time",
             next_step="take the law as a diagnosis has written it", rule="law-formula",
         )  # fmt: skip
@@ -356,7 +412,7 @@ def law_effect(name: str) -> Effect:
         on_channel=ChannelFacts(where=("output",), tare="own", by_value=ITSELF in law.signals)
         if acts in ("adds", "multiplies")
         else None,
-        term=Term(of="state", law=law, reads=law.signals) if acts == "enters" else None,
+        term=Term(of="state", law=law) if acts == "enters" else None,
     )
 
 

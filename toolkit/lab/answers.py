@@ -15,7 +15,6 @@ from toolkit.printable import escaped
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from toolkit.estimate import Estimate
     from toolkit.findings import Finding
     from toolkit.report.deliver import Delivered
     from toolkit.report.document import DeclaredTable
@@ -256,19 +255,6 @@ def mark_words(*uses: CalibrationUse) -> str:
 def signature_words(*uses: CalibrationUse) -> str:
     """Return the line of signatures of an answer for people."""
     return f"signature: {signature_of(uses)}"
-
-
-def estimate_keys(estimate: Estimate) -> EstimateEntry:
-    """Return an estimate under the keys of the answers, with its expanded uncertainty."""
-    U, k = estimate.expanded()
-    return {
-        "value": estimate.value,
-        "standard_uncertainty": estimate.u,
-        "dof": estimate.dof,
-        "expanded_uncertainty": U,
-        "k": k,
-        "unit": estimate.unit,
-    }
 
 
 def delivered_keys(delivered: Delivered) -> DeliveredDocument:

@@ -36,7 +36,7 @@ from toolkit.report.word.verify import Check, verify_docx, verify_pdf
 
 Step = Callable[[str], None]
 Writer = Callable[[Path], object]
-Issue = Callable[[Path, Sequence[Path], int, str], Mapping[str, Any]]
+Issue = Callable[[Path, Sequence[Path], int, str, Mapping[str, Any] | None], Mapping[str, Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,8 +49,9 @@ class Job:
     out, name : output folder, made where it does not exist, and the name of the two files in it
     companions : files that are handed over with the two, suffix to content (``.xml``)
     extras : further files by name, each with a function that writes it to the path it is given
-    issue : issues the PDF in place, given the files that are handed over with it, its pages and the hash of
-        what it says, and returns the ledger's proof; None for a document that is not issued
+    issue : issues the PDF in place, given the files that are handed over with it, its pages, the hash of
+        what it says and what its manifest says, and returns the ledger's proof; None for a document that is
+        not issued
     provenance : what the manifest of the hand-over names besides the outputs; None for no manifest
     stage : staging folder of a publication in ``out`` that the caller ends; None: one of its own
     """
@@ -289,21 +290,17 @@ class _Run:
         for suffix, data in job.companions.items():
             self._file(suffix).write_bytes(data)
         digest, names = content_hash(self.filled, job.template), job.names()
+        outputs = [self._stage() / name for name in names if name != MANIFEST]
+        said: Mapping[str, Any] | None = None
+        if job.provenance is not None:
+            said = statements(
+                job.provenance, job.content, job.template, digest, missing=self.filled.missing
+            )  # fmt: skip
         ledger: Mapping[str, Any] | None = None
         if job.issue is not None:
-            beside = [self._stage() / name for name in names if name != MANIFEST]
-            ledger = job.issue(pdf, [file for file in beside if file != pdf], pages, digest)
-        if job.provenance is not None:
-            outputs = [self._stage() / name for name in names if name != MANIFEST]
-            text = manifest_json(
-                job.provenance,
-                job.content,
-                job.template,
-                digest,
-                outputs,
-                ledger,
-                missing=self.filled.missing,
-            )
+            ledger = job.issue(pdf, [file for file in outputs if file != pdf], pages, digest, said)
+        if said is not None:
+            text = manifest_json(said, outputs, ledger)
             (self._stage() / MANIFEST).write_text(text, encoding="utf-8")
         self.publication.close()
         targets = [job.out / name for name in names]
@@ -386,22 +383,20 @@ def content_hash(filled: Filled, template: Template) -> str:
     return sha256_bytes(json.dumps(printed, ensure_ascii=False, separators=(",", ":")).encode())
 
 
-def manifest_json(
+def statements(
     provenance: Mapping[str, Any],
     content: ReportContent,
     template: Template,
     digest: str,
-    outputs: Sequence[Path],
-    ledger: Mapping[str, Any] | None = None,
     *,
     missing: Sequence[str] = (),
-) -> str:
-    """Return the manifest: inputs, calibration, software and outputs, each with its SHA-256.
+) -> Mapping[str, Any]:
+    """Return what a manifest says beside its files: calibration, inputs and software, each with its SHA-256.
 
-    ``provenance`` holds what the caller knows: the inputs and the software; ``ledger`` is the proof of a
-    document that was issued, ``missing`` are the tags that print a mark in place of a value.
+    ``provenance`` holds what the caller knows, the inputs and the software; ``missing`` are the tags that
+    print a mark in place of a value.
     """
-    manifest = {
+    return {
         "generator": GENERATOR,
         "schema": 1,
         "report": content.identity,
@@ -414,10 +409,15 @@ def manifest_json(
         "calibrations": [calibration.as_dict() for calibration in content.calibrations],
         "missing": list(missing),
         **provenance,
-        "outputs": [
-            {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
-            for output in outputs
-        ],
-        "ledger": ledger,
     }
-    return json.dumps(manifest, ensure_ascii=False, indent=2) + "\n"
+
+
+def manifest_json(
+    said: Mapping[str, Any], outputs: Sequence[Path], ledger: Mapping[str, Any] | None = None
+) -> str:
+    """Return the manifest: what it says, the files with their SHA-256, the proof of what was issued."""
+    files = [
+        {"name": output.name, "sha256": sha256_file(output), "bytes": output.stat().st_size}
+        for output in outputs
+    ]
+    return json.dumps({**said, "outputs": files, "ledger": ledger}, ensure_ascii=False, indent=2) + "\n"

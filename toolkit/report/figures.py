@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "os^Dvp*"
 SIZE_IN = (6.3, 3.7)
+LETTERS_PT = 10.0
+"""Of the numbers at the axes, in a figure of this size."""
 DPI = 150
 _LINE, _WORD = 15, 13  # characters of a line and of a single word that fit beside the axes in a legend
 _GREY = "#8a8a8a"
@@ -107,7 +109,7 @@ def _figure(plot: Plot) -> Figure:
 _RC: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["Carlito", "Calibri", "Liberation Sans", "DejaVu Sans"],
-    "font.size": 10.0,
+    "font.size": LETTERS_PT,
     "axes.linewidth": 0.8,
     "axes.formatter.use_mathtext": False,
     "axes.unicode_minus": True,

@@ -1,11 +1,12 @@
-"""What coloured noise does to fits of single curves: their covariance, and how well that is known.
+"""What coloured and unlike noise does to fits of single curves: their covariance, and how well it is known.
 
 The rows of a sweep repeat themselves. Least squares then has the covariance (Gauss-Markov, unweighted)
 
     s^2 (X'X)^-1 X'R X (X'X)^-1,    s^2 = r'r / tr(M R),    M = 1 - X (X'X)^-1 X'
 
 with R the correlation of the rows: a fit takes slow noise for a part of its curve, so that its residuals r
-are smaller than the noise, and tr(M R) says by how much. R is that of a first-order autoregression. Its
+are smaller than the noise, and tr(M R) says by how much. R is that of a first-order autoregression, between
+the standard deviations of rows that scatter unlike (`toolkit.tires.unlike`). Its
 coefficient is not known either: its restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545),
 which unlike the residuals' own correlation allows for the fit, is a weight for each value, and the
 covariance is the mean over them. Degrees of freedom are Satterthwaite's (Biometrics Bulletin 2 (1946) 110):
@@ -23,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.arrays import Array
+from toolkit.tires.unlike import unlike_rows
 
 # The autocorrelation of a fit's residuals: by how many rows they repeat themselves.
 
@@ -122,8 +124,8 @@ class Noise:
 
     ``time`` rows that repeat each other, 1 for white noise; ``coloured`` (k,) the curves where it is more,
     with ``information`` (k, p, p) that their rows hold of the parameters, and ``largest`` (k,) the variance
-    along the worst direction of parameters. ``factor`` (k, p, p), ``nodes`` (3, k, p, p) and ``own_dof``
-    (3, k) are what `dof_of` needs.
+    along the worst direction of parameters; rows that scatter unlike are among them. ``factor`` (k, p, p),
+    ``nodes`` (3, k, p, p), ``own_dof`` (3, k) and ``sizes`` are what `dof_of` needs.
     """
 
     variance: Array
@@ -135,15 +137,25 @@ class Noise:
     factor: Array
     nodes: Array
     own_dof: Array
+    sizes: Sizes
 
     def dof_of(self, gradients: Array) -> Array:
         """Return degrees of freedom (k, m) of m quantities of the coloured curves by gradients (k, m, p)."""
         a = np.linalg.solve(self.factor, gradients.transpose(0, 2, 1))
         V = np.einsum("kpm,nkpq,kqm->nkm", a, self.nodes, a)
-        return np.where(np.isinf(self.dof[self.coloured])[:, None], np.inf, _satterthwaite(V, self.own_dof))
+        unsure = self.sizes.unsure(np.einsum("kpm,kjpq,kqm->kjm", a, self.sizes.moved, a))
+        dof = _satterthwaite(V, self.own_dof, unsure)
+        return np.where(np.isinf(self.dof[self.coloured])[:, None], np.inf, dof)
 
 
-def noise_of(residual: Array, columns: Array, lengths: NDArray[np.intp], cost: Array, known: Array) -> Noise:
+def noise_of(
+    residual: Array,
+    columns: Array,
+    lengths: NDArray[np.intp],
+    cost: Array,
+    known: Array,
+    parts: Array | None = None,
+) -> Noise:
     """Return the noise of fits.
 
     Parameters
@@ -152,6 +164,8 @@ def noise_of(residual: Array, columns: Array, lengths: NDArray[np.intp], cost: A
     columns : (curves, p, points) weighted derivatives of the model, zero there too
     cost : (curves,) sum of squares that stands for the noise
     known : (curves,) variance known beforehand, a floor; NaN for none
+    parts : (curves, k, points) of `unlike_rows`; the rows of a curve scatter alike without them, where they
+        are few, and where their variance is known beforehand
     """
     p = columns.shape[1]
     variance = np.fmax(cost / (lengths - p), known)
@@ -163,21 +177,44 @@ def noise_of(residual: Array, columns: Array, lengths: NDArray[np.intp], cost: A
     total = np.vecdot(r, r)
     first = np.vecdot(r[:, 1:], r[:, :-1]) / np.where(total > 0, total, 1.0)
     root = 1.0 / np.sqrt(lengths)
-    coloured = np.flatnonzero((lengths >= _FEWEST) & (total > 0) & (first >= root - p / lengths))
+    enough = (lengths >= _FEWEST) & (total > 0)
+    repeats = enough & (first >= root - p / lengths)
+    slow = np.ones(len(lengths))
+    for i in np.flatnonzero(repeats & (first >= 2 * root)):
+        slow[i] = summed_time(r[i, : lengths[i]])
+    alone = [residual.copy(), columns.copy()]
+    if parts is not None and (own := np.flatnonzero(repeats)).size:
+        # Sizes are told by rows that do not repeat each other; they change slowly along a recording.
+        part = _Part(residual[own], columns[own], lengths[own], inside[own].astype(np.float64))
+        rho = part.nodes(slow[own])[1]
+        for rows, before in zip(alone, (residual, columns), strict=True):
+            by = rho.reshape(-1, *(1,) * (rows.ndim - 1))
+            rows[own, ..., 1:] -= by * before[own][..., :-1]
+            rows[own, ..., 1:] /= np.sqrt(1 - by**2)
+            rows[own] *= inside[own].reshape(len(own), *(1,) * (rows.ndim - 2), -1)
+    unlike, variances, covariance = _unlike(alone[0], alone[1], parts, enough & np.isnan(known))
+    coloured = np.flatnonzero(repeats | unlike)
     if not len(coloured):
         return Noise(
             variance=variance, dof=dof, time=time, coloured=coloured,
             information=np.zeros((0, p, p)), largest=np.zeros(0), factor=np.zeros((0, p, p)),
-            nodes=np.zeros((3, 0, p, p)), own_dof=np.zeros((3, 0)),
+            nodes=np.zeros((3, 0, p, p)), own_dof=np.zeros((3, 0)), sizes=Sizes.none(p),
         )  # fmt: skip
-    slow = np.array([
-        summed_time(r[i, : lengths[i]]) if first[i] >= 2 * root[i] else 1.0 for i in coloured
-    ])  # fmt: skip
-    part = _Part(residual[coloured], columns[coloured], lengths[coloured])
-    rho = part.nodes(slow)
+    each = inside[:, None] * 1.0 if parts is None else parts
+    size = np.einsum("ck,ckn->cn", variances, each)[coloured]
+    size = np.sqrt(size * (lengths[coloured] / size.sum(axis=1))[:, None])
+    part = _Part(residual[coloured], columns[coloured], lengths[coloured], size)
+    rho = np.where(repeats[coloured], part.nodes(slow[coloured]), 0.0)
     nodes, s2, own_dof = part.spread(rho, cost[coloured], known[coloured])
     mean = np.einsum("n,nkpq->kpq", _WEIGHTS, nodes)
-    worst = _satterthwaite(np.einsum("nkpp->nk", nodes)[..., None], own_dof)[:, 0]
+    sizes = Sizes(
+        variances=variances[coloured],
+        covariance=covariance[coloured],
+        moved=np.einsum("kpn,kjn,kqn->kjpq", part.basis, each[coloured], part.basis),
+        dof=part.spread(np.zeros_like(rho[:1]), cost[coloured], known[coloured])[2][0],
+    )
+    unsure = sizes.unsure(np.einsum("kjpp->kj", sizes.moved)[..., None])
+    worst = _satterthwaite(np.einsum("nkpp->nk", nodes)[..., None], own_dof, unsure)[:, 0]
     time[coloured] = _WEIGHTS @ ((1 + rho) / (1 - rho))
     variance[coloured] = _WEIGHTS @ s2
     dof[coloured] = np.where(np.isinf(dof[coloured]), np.inf, worst)
@@ -191,20 +228,66 @@ def noise_of(residual: Array, columns: Array, lengths: NDArray[np.intp], cost: A
         factor=part.factor,
         nodes=nodes,
         own_dof=own_dof,
+        sizes=sizes,
     )
 
 
-def _satterthwaite(V: Array, own_dof: Array) -> Array:
-    # Degrees of freedom (k, m) of variances (nodes, k, m) that have `own_dof` (nodes, k) each.
+def _unlike(
+    residual: Array, columns: Array, parts: Array | None, asked: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], Array, Array]:
+    # Which curves have rows that scatter unlike (curves,); variances of the parts and their covariance.
+    count = 1 if parts is None else parts.shape[1]
+    variances, covariance = np.zeros((len(asked), count)), np.zeros((len(asked), count, count))
+    variances[:, 0] = 1.0
+    if parts is not None and asked.any():
+        found = unlike_rows(residual[asked], columns[asked], parts[asked])
+        variances[asked], covariance[asked] = found.variances, found.covariance
+    return np.asarray((variances[:, 1:] > 0).any(axis=1)), variances, covariance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sizes:
+    """What is not known of how unlike the rows of the coloured curves (k,) scatter.
+
+    ``variances`` (k, j) of the parts and their ``covariance`` (k, j, j); ``moved`` (k, j, p, p) what a unit
+    of each leaves in basis @ noise; ``dof`` of a row's variance where the shares of the parts are known.
+    """
+
+    variances: Array
+    covariance: Array
+    moved: Array
+    dof: Array
+
+    @classmethod
+    def none(cls, p: int) -> Sizes:
+        """Return that of no curve with p parameters."""
+        return cls(
+            variances=np.zeros((0, 1)), covariance=np.zeros((0, 1, 1)),
+            moved=np.zeros((0, 1, p, p)), dof=np.zeros(0),
+        )  # fmt: skip
+
+    def unsure(self, by: Array) -> Array:
+        """Return the relative variance of variances (k, m) by (k, j, m), beyond that of a common factor."""
+        value = np.einsum("kj,kjm->km", self.variances, by)
+        square = np.einsum("kjm,kji,kim->km", by, self.covariance, by)
+        relative = square / np.maximum(value**2, 1e-300)
+        return np.asarray(np.maximum(relative - 2 / self.dof[:, None], 0.0))
+
+
+def _satterthwaite(V: Array, own_dof: Array, unsure: Array) -> Array:
+    # Degrees of freedom (k, m) of variances (nodes, k, m) that have `own_dof` (nodes, k) each, and what is
+    # `unsure` (k, m) of the shares of their parts.
     mean = np.einsum("n,nkm->km", _WEIGHTS, V)
     apart = (V - mean) ** 2 + 2 * V**2 / own_dof[..., None]
-    return np.asarray(np.maximum(2 * mean**2 / np.einsum("n,nkm->km", _WEIGHTS, apart), 1.0))
+    spread = np.einsum("n,nkm->km", _WEIGHTS, apart) + unsure * mean**2
+    return np.asarray(np.maximum(2 * mean**2 / spread, 1.0))
 
 
 class _Part:
-    # The coloured curves with an orthonormal basis of their columns: columns = factor @ basis.
-    def __init__(self, residual: Array, columns: Array, lengths: NDArray[np.intp]) -> None:
-        self.residual, self.lengths = residual, lengths
+    # The coloured curves with an orthonormal basis of their columns: columns = factor @ basis. ``size`` is
+    # the standard deviation of each row over the root of their mean square, zero beyond a curve's length.
+    def __init__(self, residual: Array, columns: Array, lengths: NDArray[np.intp], size: Array) -> None:
+        self.residual, self.lengths, self.size = residual, lengths, size
         normal = columns @ columns.transpose(0, 2, 1)
         size = np.sqrt(np.einsum("cpp->cp", normal)) + 1e-300
         unit = normal / (size[:, :, None] * size[:, None, :])
@@ -215,7 +298,8 @@ class _Part:
 
     def nodes(self, slow: Array) -> Array:
         """Return coefficients (3, curves); ``slow`` is the time of the summed correlations."""
-        likelihood = restricted_likelihood(self.residual, self.basis, self.lengths)
+        over = np.where(self.size > 0, 1.0 / np.where(self.size > 0, self.size, 1.0), 0.0)
+        likelihood = restricted_likelihood(self.residual * over, self.basis * over[:, None], self.lengths)
         weight = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
         middle = weight @ _Z
@@ -227,12 +311,15 @@ class _Part:
 
     def spread(self, rho: Array, cost: Array, known: Array) -> tuple[Array, Array, Array]:
         """Return of each node the covariance of basis @ noise, a row's variance, its degrees of freedom."""
-        moved = _correlated(self.basis, rho, self.lengths)
+        size = self.size[:, None]
+        moved = _correlated(self.basis * size, rho, self.lengths) * size
         G = moved @ self.basis.transpose(0, 2, 1)  # (nodes, curves, p, p)
         n = self.lengths
         trace = np.einsum("kcpp->kc", G)
         remaining = np.maximum(n - trace, 1.0)
-        square = _sum_of_squares(rho, n) - 2 * np.einsum("kcpn,kcpn->kc", moved, moved)
+        squares = np.broadcast_to(size**2, (len(rho), *size.shape))
+        square = np.einsum("kcpn,kcpn->kc", squares, _correlated(size**2, rho**2, n))
+        square -= 2 * np.einsum("kcpn,kcpn->kc", moved, moved)
         square = np.maximum(square + np.einsum("kcpq,kcqp->kc", G, G), 1e-300)
         s2 = np.fmax(cost / remaining, known)
         return s2[..., None, None] * G, s2, remaining**2 / square
@@ -252,9 +339,3 @@ def _correlated(rows: Array, rho: Array, lengths: NDArray[np.intp]) -> Array:
             product = dptsv(diagonal, np.full(n - 1, -correlation), right)[2]
             products[node, curve, :, :n] = (1.0 - correlation * correlation) * product.T
     return products
-
-
-def _sum_of_squares(rho: Array, n: NDArray[np.intp]) -> Array:
-    # tr(R R) = n + 2 sum_k (n - k) rho^2k, k = 1 to n - 1.
-    a = rho**2
-    return np.asarray(n + 2 * a * (n * (1 - a) - (1 - a**n)) / (1 - a) ** 2)

@@ -22,9 +22,10 @@ from toolkit.tires.kernel import (
     Problems,
     curvature_parameter,
     sine,
+    theta_of,
 )
 from toolkit.tires.model import CHANNEL_UNIT, LOSSES, Curve, CurveFit, Loss, Parameter
-from toolkit.tires.models.magic_formula import MODEL
+from toolkit.tires.models.magic_formula import MODEL, slope, value
 from toolkit.tires.quality import error_percent, scatter_floor_percent
 from toolkit.tires.solver import Solution, solve, solve_robust
 from toolkit.tires.uncertainty import Spread, curve_columns, spread
@@ -215,7 +216,8 @@ def _fit_group(
     columns = curve_columns(solution, problems)
     # Known uncertainties are a floor: scatter or misfit beyond them widens the intervals (Birge).
     cost = np.maximum(inflation * solution.state.cost, _TINY_VARIANCE * (lengths - 6))
-    noise = noise_of(residual * problems.sw, columns, lengths, cost, scale.known)
+    parts = None if loss == "robust" else _parts(solution, problems)
+    noise = noise_of(residual * problems.sw, columns, lengths, cost, scale.known, parts)
     spreads = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
     return [
         _result(
@@ -230,6 +232,14 @@ def _fit_group(
         )
         for i, curve in enumerate(curves)
     ]
+
+
+def _parts(solution: Solution, problems: Problems) -> Array:
+    # What makes rows scatter: the channel itself, the slip angle, the load or a gain (curves, 3, points).
+    theta = theta_of(solution.state)
+    level = value(theta.T[..., None], problems.u) - theta[:, 5:]
+    each = np.stack([np.ones_like(problems.u), slope(theta.T[..., None], problems.u), level], axis=1)
+    return np.asarray((each * problems.sw[:, None]) ** 2)
 
 
 def _result(

@@ -19,6 +19,7 @@ from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.between_loads import Between
 from toolkit.tires.evaluate import stiffness
 from toolkit.tires.global_data import CHANNELS, Measured, binned, cell, what_varies
+from toolkit.tires.global_misfit import Task
 from toolkit.tires.global_model import (
     GlobalFit,
     GlobalModel,
@@ -29,7 +30,7 @@ from toolkit.tires.global_model import (
     pooled_percent,
 )
 from toolkit.tires.global_seeds import LACKS, seeds_of, why_not_global
-from toolkit.tires.global_stage import StageFit, Task, refit, run
+from toolkit.tires.global_stage import StageFit, refit, run
 from toolkit.tires.model import LOSSES, Loss, Parameter
 from toolkit.tires.quality import scatter_floor_percent
 

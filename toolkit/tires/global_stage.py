@@ -21,11 +21,10 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.estimate import coverage_factor
-from toolkit.tires.between_loads import Between
-from toolkit.tires.colour import autocorrelation_time
 from toolkit.tires.global_data import Measured
-from toolkit.tires.global_model import GlobalModel
-from toolkit.tires.global_solver import Box, Descent, descend, descend_each, linearise, spread_starts
+from toolkit.tires.global_misfit import Misfit, Task
+from toolkit.tires.global_noise import Covariance, Noise, noise_of
+from toolkit.tires.global_solver import Box, Descent, descend, descend_each, spread_starts
 
 _SAME = 1e-3  # the files contract: starts that agree in cost to this are at one minimum
 _EXACT = 1e-18  # a cost below this share of the data's square is rounding
@@ -38,25 +37,6 @@ _WIDE = (0.3, 2.5)  # an interval of more than 30 % of the value and 2.5 sizes t
 _LEVEL = 0.95
 _BIWEIGHT = 4.685  # 95 % efficiency on normal noise
 _POLISH = 4_000_000  # rows x inner points x copies that a polish on the rows may cost a step
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Task:
-    """A stage: channels, the free parameters' places, and all values (parameters,) with earlier stages' held.
-
-    ``sigma`` (rows,) standard deviation of a row relative to the others, None where all are alike;
-    ``between`` what keeps the model physical between the rows, None where nothing does.
-    """
-
-    model: GlobalModel
-    data: Measured
-    channels: tuple[str, ...]
-    values: Array
-    free: tuple[int, ...]
-    starts: Array
-    sigma: Array | None = None
-    robust: bool = False
-    between: Between | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,64 +68,6 @@ class StageFit:
     kept: tuple[str, ...] = ()
 
 
-class Misfit:
-    """Residuals of parameter sets, each channel over its own size; weights multiply them."""
-
-    def __init__(self, task: Task, data: Measured, weight: Array, scale: dict[str, float]) -> None:
-        self.model, self.data, self.channels = task.model, data, task.channels
-        self.base, self.free, self.scale = task.values.copy(), list(task.free), scale
-        self.weight = np.concatenate([weight] * len(self.channels)) if len(weight) == len(data) else weight
-        self.y = np.concatenate([data[name] / scale[name] for name in self.channels])
-        self.between = task.between
-        # A tenth beyond what is physical costs as much as all rows would without a model.
-        self.stiff = 10.0 * float(np.sqrt(np.sum(self.weight**2)))
-
-    def _values(self, x: Array) -> list[float | Array]:
-        values: list[float | Array] = list(self.base.tolist())
-        for place, column in zip(self.free, x.T, strict=True):
-            values[place] = column[:, None]
-        return values
-
-    def raw(self, x: Array) -> Array:
-        """Return unweighted residuals (copies, rows x channels) of free parameters (copies, p)."""
-        values = self._values(x)
-        with np.errstate(all="ignore"):
-            responses = self.model.forces(values, self.data.rows)
-        shape = (len(x), len(self.data))
-        parts = [np.broadcast_to(responses[name] / self.scale[name], shape) for name in self.channels]
-        r: Array = np.concatenate(parts, axis=1) - self.y
-        return np.nan_to_num(r, nan=1e3, posinf=1e3, neginf=-1e3)
-
-    def __call__(self, x: Array) -> Array:
-        """Return weighted residuals (copies, rows x channels), then what is not physical between the rows."""
-        weighted = self.raw(x) * self.weight
-        if self.between is None:
-            return weighted
-        excess = self.between.excess(self._values(x), len(x))
-        return np.concatenate([weighted, self.stiff * excess], axis=1)
-
-    def box(self) -> Box:
-        """Return bounds and sizes of the free parameters."""
-        parameters = [self.model.parameters[place] for place in self.free]
-        return Box(
-            low=np.array([parameter.low for parameter in parameters]),
-            high=np.array([parameter.high for parameter in parameters]),
-            size=np.array([parameter.size for parameter in parameters]),
-            cost_per_copy=len(self.data) * self.model.grid,
-        )
-
-    def release(self, places: Sequence[int], x: Array) -> Array:
-        """Free parameters that were held; return all free ones (1, p), those of ``x`` (1, free) first."""
-        self.base[self.free] = x[0]
-        self.free += list(places)
-        return self.base[self.free][None]
-
-    def hold(self, place: int, value: float) -> None:
-        """Take a parameter out of the search."""
-        self.base[place] = value
-        self.free.remove(place)
-
-
 def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int = 2) -> StageFit:
     """Return what a stage finds; ``coarse`` are the means of bins of ``width`` [rad], ``count`` rows each.
 
@@ -157,7 +79,7 @@ def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int 
     coarse_weight = np.sqrt(count)
     if task.sigma is not None:
         coarse_weight = coarse_weight * _coarse(task.data, coarse, weight)
-    search = Misfit(task, coarse, coarse_weight, scale)
+    search = Misfit(task, coarse, coarse_weight, scale, count)
     rows = Misfit(task, task.data, weight, scale)
     start = task.starts[:, list(task.free)]
     descent, starts = _search(search, start)
@@ -172,30 +94,31 @@ def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int 
     if task.robust:
         work = judged
         x, work.weight = _reweight(work, x)
-    time, variance, dof = _noise(judged, x)
     fixed: list[tuple[int, str]] = []
-    x = _prune(work, x, variance, dof, fixed)
+    x = _prune(work, x, noise_of(judged, x, alike=task.robust), fixed)
     for misfit_of in (judged, rows):
         misfit_of.base, misfit_of.free = work.base.copy(), list(work.free)
     misfit = rows if cheap else search
     if cheap:
         x = descend(rows, x, rows.box(), steps=10, tolerance=1e-10).x
-    time, variance, dof = _noise(judged, x)
+    noise = noise_of(judged, x, alike=task.robust)
     on_rows = cheap or len(coarse) == len(task.data)
     box = misfit.box()
-    factor = coverage_factor(dof)
     bound = _at_bound(x[0], box)
     values = misfit.base.copy()
     values[misfit.free] = x[0]
     free, held = tuple(misfit.free), tuple(place for place, _ in fixed)
     bounded = tuple(p for p, at in zip(free, bound, strict=True) if at)
     # What is held at a default may be anywhere within its bounds: the others move with it.
-    spread, errors = _covariance(misfit, misfit.release(held, x), variance)
-    half = factor * errors[: len(free)]
-    rivals = _rivals(descent, searched, factor**2 * variance)[:, list(free)] - values[list(free)]
+    every = Covariance(misfit, misfit.release(held, x), noise)
+    spread, dof = every.covariance, every.dof
+    factor = coverage_factor(dof)
+    half = factor * every.errors[: len(free)]
+    excess = factor**2 * noise.variance * every.largest
+    rivals = _rivals(descent, searched, excess)[:, list(free)] - values[list(free)]
     sides = np.stack([half, half])
     if cheap and task.model.grid == 1 and not task.robust:
-        sides, better = _profile(misfit, spread, half, factor**2 * variance)
+        sides, better = _profile(misfit, every.alike / noise.variance, half, excess)
         if better is not None and again:
             starts_of = np.concatenate([better[None], task.starts])
             return run(replace(task, starts=starts_of), coarse, count, width, again=again - 1)
@@ -204,7 +127,7 @@ def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int 
     half = sides.max(axis=0)
     wide = half > np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
     undetermined = [p for p, at, too in zip(free, bound, wide, strict=True) if at or too]
-    linear = factor * errors[: len(free)]
+    linear = factor * every.errors[: len(free)]
     # Of each parameter by itself: what follows from all of them together, a stiffness, keeps their spread.
     stretch = np.where(linear > 1e-9 * half, half / np.maximum(linear, 1e-300), 1.0)
     covariance = spread[: len(free), : len(free)] * np.outer(stretch, stretch)
@@ -219,33 +142,33 @@ def run(task: Task, coarse: Measured, count: Array, width: float, *, again: int 
         undetermined=tuple(undetermined),
         starts=starts,
         agreeing=agreeing,
-        time=time,
+        time=noise.time,
         dof=dof,
         bin_width=0.0 if on_rows else width,
     )
 
 
-def _profile(misfit: Misfit, spread: Array, half: Array, rise: float) -> tuple[Array, Array | None]:
+def _profile(misfit: Misfit, inverse: Array, half: Array, excess: float) -> tuple[Array, Array | None]:
     """Return how far the intervals reach below and above (2, reported), and all values of a better end.
 
     Each parameter is held at either end of its linear interval and all else is fitted again: where the cost
-    rises by less than ``rise``, as a parabola would, that end moves out.
+    rises by less than its parabola does, that end moves out. An end is better where the cost is lower by
+    ``excess``. ``inverse`` (free, free) is that of the normal matrix.
     """
     box, count = misfit.box(), len(half)
     x = descend(misfit, misfit.base[misfit.free][None], box, steps=_REFITS, tolerance=1e-6)
-    variances = np.maximum(np.diag(spread)[:count], 1e-300)
-    step = spread[:count] * (half / variances)[:, None]
+    own = np.maximum(np.diag(inverse)[:count], 1e-300)
+    step = inverse[:count] * (half / own)[:, None]
     ends = np.clip(np.concatenate([x.x - step, x.x + step]), box.low, box.high)
-    held = np.tile(np.eye(count, len(spread), dtype=np.bool_), (2, 1))
+    held = np.tile(np.eye(count, len(inverse), dtype=np.bool_), (2, 1))
     moved = np.abs((ends - x.x)[held]).reshape(2, count)
     away = descend_each(misfit, ends, box, steps=_REFITS, tolerance=1e-4, held=held)
     lowest = int(np.argmin(away.cost))
-    if away.cost[lowest] < x.cost[0] - rise:
+    if away.cost[lowest] < x.cost[0] - excess:
         better = misfit.base.copy()
         better[misfit.free] = away.x[lowest]
         return np.stack([half, half]), better
-    expected = rise * (moved / np.maximum(half, 1e-300)) ** 2
-    risen = (away.cost.reshape(2, count) - x.cost[0]) / np.maximum(expected, 1e-300)
+    risen = (away.cost.reshape(2, count) - x.cost[0]) / np.maximum(moved**2 / own, 1e-300)
     # At a bound there is no way out, and where rounding leaves no interval nothing to be held against.
     risen = np.where(moved > 1e-9 * box.size[:count], risen, 1.0)
     return half * np.sqrt(np.maximum(_PARABOLA / np.maximum(risen, _LEAST_RISE), 1.0)), None
@@ -320,58 +243,25 @@ def _reweight(misfit: Misfit, x: Array) -> tuple[Array, Array]:
     return x, misfit.weight
 
 
-def _noise(rows: Misfit, x: Array) -> tuple[float, float, float]:
-    # Autocorrelation time, variance of a row of weight one with it, degrees of freedom.
-    if rows.free:
-        residual, J = linearise(rows, x, rows.box())
-        r, columns = residual[0, : len(rows.y)], J[0, :, : len(rows.y)]
-    else:
-        r, columns = rows(x)[0, : len(rows.y)], np.zeros((0, len(rows.y)))
-    channels = len(rows.channels)
-    time = max(
-        autocorrelation_time(part, own)
-        for part, own in zip(np.split(r, channels), np.split(columns, channels, axis=1), strict=True)
-    )
-    effective_rows = float(np.count_nonzero(rows.weight > 1e-3 * rows.weight.max()))  # outliers are no rows
-    freedom = max(effective_rows - len(rows.free), 1.0)
-    return time, max(float(r @ r) / freedom, 1e-26) * time, max(effective_rows / time - len(rows.free), 1.0)
-
-
-def _covariance(misfit: Misfit, x: Array, variance: float) -> tuple[Array, Array]:
-    # By sizes for the inverse; what the bounds alone say keeps it finite.
-    box = misfit.box()
-    if not len(misfit.free):
-        return np.zeros((0, 0)), np.zeros(0)
-    _, J = linearise(misfit, x, box, fine=True)
-    J = J[:, :, : len(misfit.y)]  # a bound is no measurement
-    information = J[0] @ J[0].T / variance
-    information += np.diag(12.0 * (box.size / (box.high - box.low)) ** 2)
-    unit = 1.0 / np.sqrt(np.diag(information))
-    inverse = np.linalg.inv(information * np.outer(unit, unit)) * np.outer(unit, unit)
-    covariance = inverse * np.outer(box.size, box.size)
-    return covariance, np.sqrt(np.maximum(np.diag(covariance), 0.0))
-
-
 def _at_bound(x: Array, box: Box) -> Sequence[bool]:
     margin = 1e-4 * box.size
     return [bool(is_at_bound) for is_at_bound in (x <= box.low + margin) | (x >= box.high - margin)]
 
 
-def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tuple[int, str]]) -> Array:
+def _prune(misfit: Misfit, x: Array, noise: Noise, fixed: list[tuple[int, str]]) -> Array:
     # One at a time, the worst first: parameters that are not determined move together. Every trial is held
     # against the whole model, not against the last trial: many small rises would add up to a large one.
     from scipy.special import fdtri
 
-    factor = coverage_factor(dof)
     survivors: set[int] = set()
     r = misfit(x)[0]
     total, rounding = float(r @ r), _EXACT * float(np.sum((misfit.y * misfit.weight) ** 2))
     while misfit.free:
         box = misfit.box()
-        _, errors = _covariance(misfit, x, variance)
+        every = Covariance(misfit, x, noise)
         allowed = np.maximum(_WIDE[0] * np.abs(x[0]), _WIDE[1] * box.size)
         bound = np.array(_at_bound(x[0], box))
-        excess = np.where(bound, 10.0, factor * errors / allowed)
+        excess = np.where(bound, 10.0, coverage_factor(every.dof) * every.errors / allowed)
         excess[[place in survivors for place in misfit.free]] = 0.0
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
@@ -383,7 +273,7 @@ def _prune(misfit: Misfit, x: Array, variance: float, dof: float, fixed: list[tu
         misfit.hold(place, spec.default)
         trial = descend(misfit, remaining_starts.copy(), misfit.box(), steps=12, tolerance=1e-7)
         count = len(fixed) + 1
-        allowed_rise = min(count * float(fdtri(count, dof, _LEVEL)) * variance, _SAME * total)
+        allowed_rise = min(count * float(fdtri(count, noise.dof, _LEVEL)) * noise.variance, _SAME * total)
         if trial.cost[0] <= total + allowed_rise + rounding:
             x = trial.x
             fixed.append((place, f"not determined by these data, fixed at its default {spec.default:g}"))

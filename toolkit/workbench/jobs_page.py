@@ -31,16 +31,15 @@ def jobs(request: Request) -> Response:
     return page(request, "jobs", jobs=works, archives=archives_of(bench.home))
 
 
-def job(request: Request) -> Response:
+def job(request: Request, template: str = "job") -> Response:
     """Return a job's page."""
     bench, work = _requested(request)
-    return page(request, "job", seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
+    return page(request, template, seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
 
 
 def state(request: Request) -> Response:
     """Return a job as it stands now: its page asks for this while it runs."""
-    bench, work = _requested(request)
-    return page(request, "part_job", seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
+    return job(request, "part_job")
 
 
 def cancel(request: Request) -> Response:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import json
 import subprocess
@@ -39,9 +38,6 @@ from toolkit.characteristics.characteristic import (
 from toolkit.characteristics.groups import CHANNELS
 from toolkit.lab.home import packaged_home
 from toolkit.report.test.content import REPORT
-from toolkit.simulation.plan import Plan
-from toolkit.simulation.run import simulate
-from toolkit.simulation.write import write_test
 from toolkit.units import si_scale
 from toolkit.words.phrasebook import languages, phrasebook
 
@@ -199,7 +195,7 @@ def program(folder: Path, *words: object, code: str = PROGRAM) -> Any:
 
 @pytest.mark.campaign("the recipe of CONTRIBUTING.md adds one characteristic more in every run")
 def test_one_more_characteristic_is_one_file(
-    tmp_path: Path, virtual_test: Path, other_virtual_test: Path
+    tmp_path: Path, virtual_test: Path, virtual_repeat: Path
 ) -> None:
     """The answer, the sheets, the report, comparisons, tags and the explanation have it, without a list."""
     folder = tmp_path / "more"
@@ -234,7 +230,7 @@ def test_one_more_characteristic_is_one_file(
     assert 10.0 < content["summary"] < 60.0
     assert "Pneumatic trail [mm] against load" in content["alt"]
 
-    differences = program(folder, "compare", virtual_test, other_virtual_test, *home)["differences"]
+    differences = program(folder, "compare", virtual_test, virtual_repeat, *home)["differences"]
     assert sum(one["quantity"] == "pneumatic_trail" for one in differences) == 10
 
     tags = {one["tag"] for one in program(folder, "template", "tags", "--json")["tags"]}
@@ -260,11 +256,3 @@ def test_a_file_from_before_a_characteristic_is_read_and_keeps_its_hash(
     content = program(more, whole, code=CONTENT.replace('content.plots["trail"].alt', "None"))
     place = content["columns"].index("pneumatic_trail")
     assert {row[place] for row in map(tuple, content["rows"])} == {None}
-
-
-@pytest.fixture(scope="module")
-def other_virtual_test(tmp_path_factory: pytest.TempPathFactory, virtual_plan: Plan) -> Path:
-    """A second virtual test on another day."""
-    folder = tmp_path_factory.mktemp("other") / "again"
-    write_test(simulate(dataclasses.replace(virtual_plan, seed=2)), folder)
-    return folder

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from toolkit.diagnosis.answer.locate import places
-from toolkit.diagnosis.answer.next_measurements import apart, next_measurements, to_find_it
+from toolkit.diagnosis.answer.next_measurements import apart, next_measurements, to_find_it, zeros_to_read
 from toolkit.diagnosis.search.unexplained import Line
 
 
@@ -190,10 +190,35 @@ def test_whoever_has_something_left_is_told_what_to_measure(rest, skipped, sente
     """A filter is named, and its class is itself: what asks for a measurement is what it leaves."""
     search = found("time", inputs=("u",), unit="V", reason="a floor above a tenth of the output's spread")
     search.problem.runs = (Of(), Of())
-    search.problem.names, search.augmented = (), None  # no output's rest is beyond all noise
+    # No output's rest is beyond all noise, or to one side.
+    search.problem.names, search.problem.model, search.augmented = (), Of(outputs=()), None
     search.disagreed, search.steps = None, ()
     named = (Of(name="filter_lag", equivalent_to=()),)
     assert list(next_measurements(search, named, "named", rest=rest, skipped=skipped)) == sentences
+
+
+@pytest.mark.parametrize(
+    ("zeros", "told"),
+    [
+        ((-0.05, -0.046, -0.09), ["T reads low in every run, by 0.046 to 0.09 N*m: read its zero before"]),
+        ((0.05, 0.046, 0.09), ["T reads high in every run, by 0.046 to 0.09 N*m: read its zero before"]),
+        ((0.05, -0.046, 0.09), []),
+        ((-0.046,), ["T reads low all along, by 0.046 N*m: read its zero before"]),
+        ((0.005, 0.005, 0.005), []),  # a tenth of what else is left
+    ],
+)
+def test_a_zero_that_every_run_has_to_one_side_is_to_be_read(zeros, told):
+    runs = len(zeros)
+    wave = 0.03 * np.sin(np.arange(100 * runs) * 0.2)
+    residual = np.concatenate(
+        [zero + part - part.mean() for zero, part in zip(zeros, np.split(wave, runs), strict=True)]
+    )
+    problem = Of(
+        model=Of(outputs=(Of(name="T", unit="N*m"),)), kept={"T": np.ones(100 * runs, bool)},
+        slices=tuple(slice(100 * k, 100 * k + 100) for k in range(runs)),
+    )  # fmt: skip
+    said = zeros_to_read(Of(problem=problem, augmented=Of(residual={"T": residual})))
+    assert [text.split(" and after")[0] for text in said] == told
 
 
 def test_the_advice_beside_a_name_is_about_what_it_leaves():

@@ -9,6 +9,7 @@ import pytest
 from tests.workbench.conftest import ROOT
 from tests.workbench.test_diagnosis_page import SIMULATOR, TOML
 from toolkit.errors import ToolkitError
+from toolkit.lab.desk.built_case import add_files
 from toolkit.lab.desk.previews import template_findings
 from toolkit.lab.desk.uploads import claimed_folder, hand_in_case, hand_in_template
 
@@ -67,6 +68,26 @@ def test_a_template_takes_the_place_of_another_with_consent_alone(tmp_path: Path
     assert contents(tmp_path)["report_templates/own.docx"] == b"before"
     hand_in_template(tmp_path, [("own.docx", ORG)], replace=True)
     assert contents(tmp_path) == {"report_templates/own.docx": ORG, "report_templates/other.docx": b"other"}
+
+
+@pytest.mark.parametrize("replace", [False, True])
+@pytest.mark.parametrize("name", ["Own.docx", "OWN.DOCX"])
+def test_a_template_that_differs_by_case_alone_is_refused(tmp_path: Path, name: str, replace: bool) -> None:
+    """A disk that tells no case, where a copy of the home may lie, would hold one of the two."""
+    (tmp_path / "report_templates").mkdir()
+    (tmp_path / "report_templates" / "own.docx").write_bytes(b"before")
+    with pytest.raises(ToolkitError) as caught:
+        hand_in_template(tmp_path, [(name, ORG)], replace=replace)
+    assert "own.docx, which differs by case alone" in str(caught.value)
+    assert contents(tmp_path) == {"report_templates/own.docx": b"before"}
+
+
+def test_files_of_a_case_that_differ_by_case_alone_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ToolkitError, match="names of their own"):
+        hand_in_case(tmp_path, [*CASE, ("R0.csv", b"L,F\n1,2\n")])
+    place = tmp_path / hand_in_case(tmp_path, CASE)
+    with pytest.raises(ToolkitError, match="new files"):
+        add_files(place, [("R0.csv", b"L,F\n1,2\n")])
 
 
 def test_a_case_enters_as_it_was_handed_in(tmp_path: Path) -> None:

@@ -31,6 +31,29 @@ FIELD = (
 )
 
 
+PICTURE = '<w:r><w:drawing><wp:inline><wp:extent cx="{0}" cy="{0}"/></wp:inline></w:drawing></w:r>'
+NARROW = (
+    '<w:tbl><w:tblPr/><w:tblGrid><w:gridCol w:w="500"/><w:gridCol w:w="8000"/></w:tblGrid><w:tr><w:tc>'
+    + p("{{tk:figure.gough}}")
+    + "</w:tc><w:tc>"
+    + p("beside")
+    + "</w:tc></w:tr></w:tbl>"
+)
+
+
+@pytest.mark.parametrize(("width", "level"), [("0.5mm", "error"), ("1cm", "error"), ("40mm", "warning")])
+def test_a_spot_in_place_of_a_figure_is_refused(tmp_path: Path, width: str, level: str) -> None:
+    found = check_template(
+        opened(tmp_path, p(f"{{{{tk:figure.gough|width={width}}}}}")), Style(), fonts=False
+    )
+    assert [(one.rule, one.level) for one in found] == [("figure-small", level)]
+
+
+@pytest.mark.parametrize("width", ["60mm", "6cm", "2.5in", "180pt"])
+def test_a_figure_that_can_be_read_may_be_small(tmp_path: Path, width: str) -> None:
+    assert rules(tmp_path, p(f"{{{{tk:figure.gough|width={width}}}}}")) == []
+
+
 @pytest.mark.parametrize(
     ("body", "rule"),
     [
@@ -58,6 +81,10 @@ FIELD = (
         (p('<w:r><w:pict><v:shape xmlns:v="urn:schemas-microsoft-com:vml"><v:textpath string="No {{tk:report.id}}"/></v:shape></w:pict></w:r>'), "wrong-place"),
         (p("{{tk:chart.models_fy}}"), "not-as-chart"),
         (p("{{tk:chart.gough|.2f}}"), "bad-format"),
+        (p("{{tk:figure.gough|width=0.5mm}}"), "figure-small"),
+        (p("{{tk:chart.gough|width=2cm}}"), "figure-small"),
+        (p(sdt("tk:figure.gough", PICTURE.format(12700))), "figure-small"),
+        (NARROW, "figure-small"),
         (p("{{tk:row.SA}}"), "wrong-place"),
         (p("{{tk:if.pull}}"), "wrong-place"),
         ('<w:p><w:pPr><w:pStyle w:val="Heading1"/></w:pPr>' + sdt("tk:figure.gough", run("x")) + "</w:p>", "wrong-place"),

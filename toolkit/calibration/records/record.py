@@ -12,6 +12,7 @@ import re
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, cast
 
+from toolkit.calibration.issued import issued_text
 from toolkit.calibration.records.scatter import MODELS, UNTOLD, RunScatter
 from toolkit.errors import RecordError
 from toolkit.files import parse_json, sha256_bytes
@@ -90,6 +91,11 @@ class LoadFit:
         if self.minimum is None or self.maximum is None:
             return float("nan")
         return max(abs(self.minimum), abs(self.maximum))
+
+    @property
+    def issued_texts(self) -> tuple[str, ...]:
+        """Issued coefficients in the digits of their issue, of a legacy import as its document has them."""
+        return tuple((repr if self.method == "legacy" else issued_text)(value) for value in self.issued)
 
     @property
     def standard_errors(self) -> tuple[float, ...]:

@@ -27,6 +27,7 @@ from toolkit.calibration.fit.session_fit import (
     load_errors,
     load_uncertainty,
 )
+from toolkit.calibration.issued import issued_value
 from toolkit.calibration.records.golden import (
     golden_inputs,
     predict_exactly,
@@ -56,7 +57,7 @@ from toolkit.calibration.registry.registry import ID, Registry, load_checked
 from toolkit.calibration.registry.status import discarded_before, is_discarded
 from toolkit.calibration.registry.store import Change
 from toolkit.calibration.session.read import LoadSetting, Session, read_session
-from toolkit.calibration.terms import issued_value, term_matrix
+from toolkit.calibration.terms import term_matrix
 from toolkit.errors import ToolkitError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding

@@ -23,12 +23,13 @@ from toolkit.calibration.fit.rounding import rounding_of
 from toolkit.calibration.fit.row_noise import RowNoise, noise_of, shown_rows, weighed_rows
 from toolkit.calibration.fit.session_rows import groups_of
 from toolkit.calibration.fit.session_scatter import FittedRows, is_of_rows
+from toolkit.calibration.issued import issued_value
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.records.scatter import SHOWN
 from toolkit.calibration.session.known_errors import KnownErrors, known_errors
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
-from toolkit.calibration.terms import INTERCEPT, issued_value, term_matrix, term_reach, term_slopes
+from toolkit.calibration.terms import INTERCEPT, term_matrix, term_reach, term_slopes
 from toolkit.errors import RecordError
 from toolkit.units import unit
 

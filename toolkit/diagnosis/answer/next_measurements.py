@@ -113,7 +113,7 @@ def next_measurements(
     elif rest:
         sentences += to_find_it(search, subject="What is left" if effects else "The mismatch")
     if rest:
-        sentences += _sensors(search)
+        sentences += [*zeros_to_read(search), *_sensors(search)]
     if verdict == "unknown" or effects:
         beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
         near = f"beside {beside}" if effects else f"even beside the nearest effects ({beside})"
@@ -132,6 +132,28 @@ def next_measurements(
     if len(search.problem.runs) == 1:
         sentences.append("Repeat the run: with one recording alone, only blocks of it could be held out.")
     return tuple(sentences)
+
+
+def zeros_to_read(search: Search) -> list[str]:
+    """Return that a zero is to be read, where most of a rest is one that every run has to the same side.
+
+    Of a few runs that is no proof of a zero that they share, and yet the first that a laboratory looks at.
+    """
+    problem, sentences = search.problem, []
+    for output in problem.model.outputs:
+        kept, residual = problem.kept[output.name], search.augmented.residual[output.name]
+        runs = [residual[rows][kept[rows]] for rows in problem.slices if kept[rows].any()]
+        means = sorted((float(np.mean(run)) for run in runs), key=abs)
+        taken = sum(len(run) * float(np.mean(run)) ** 2 for run in runs)
+        if len(set(np.sign(means))) != 1 or taken < 0.5 * float(np.sum(residual[kept] ** 2)):
+            continue
+        side = "high" if means[0] > 0 else "low"
+        low, high = f"{abs(means[0]):.2g}", with_unit(f"{abs(means[-1]):.2g}", output.unit)
+        where, when = (
+            (f"in every run, by {low} to", "each run") if len(runs) > 1 else ("all along, by", "the run")
+        )
+        sentences.append(f"{output.name} reads {side} {where} {high}: read its zero before and after {when}.")
+    return sentences
 
 
 def _sensors(search: Search) -> list[str]:
@@ -161,6 +183,7 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     inputs = [channel.name for channel in case.drivers if channel.role == "input"]
     channels = {channel.name for channel in case.drivers}
     rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
+    rates |= {f"way of {name}": f"the way of {name}" for name in channels}
     varied = [rates.get(name, name) for name in variables if name in channels or name in rates]
     sentences = []
     if varied:

@@ -129,7 +129,7 @@ def _first(octaves: Sequence[Octave], most: int) -> int:
     ratios = []
     for k in range(min(most + 1, len(octaves))):
         gain = sum(octave.gain for octave in octaves[k:])
-        dilution = sum(octave.dilution for octave in octaves[k:])
+        dilution = sum(octave.dilution for octave in octaves[k:] if not octave.is_quiet)
         ratios.append(gain / max(gain + dilution, 1e-300))
     enough = AVERAGES.slope * max(ratios, default=0.0)
     steady = [k for k, ratio in enumerate(ratios) if ratio >= enough]

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.policy import STRUCTURE
+from toolkit.diagnosis.simulators.setting import is_speed
+from toolkit.effects.law import way
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
@@ -80,8 +82,14 @@ def _variables(problem: Problem) -> list[tuple[str, Array]]:
         for channel in problem.case.drivers
         if all(channel.name in run.columns for run in problem.runs)
     ]
-    rates = []
+    rates, ways = [], []
     if problem.case.has_time:
+        # Where something is shows over the way, which a recording of the speed alone has too.
+        ways = [
+            (f"way of {channel.name}", _way(problem, channel.name))
+            for channel in problem.case.drivers
+            if is_speed(channel.unit) and all(channel.name in run.columns for run in problem.runs)
+        ]
         elapsed = np.concatenate([run.t - run.t[0] for run in problem.runs])
         for name, x in variables:
             steps = []
@@ -93,7 +101,12 @@ def _variables(problem: Problem) -> list[tuple[str, Array]]:
                 low, high = np.quantile(rate, (0.005, 0.995))
                 rates.append((f"d{name}/dt", np.clip(rate, low, high)))
         variables.append(("time", elapsed))
-    return [*variables, *rates]
+    return [*variables, *ways, *rates]
+
+
+def _way(problem: Problem, name: str) -> Array:
+    """Return the way of a recorded speed from the first row of each run on."""
+    return np.concatenate([way(run.t, run.columns[name]) for run in problem.runs])
 
 
 def _spline(x: Array, most: int) -> Array | None:

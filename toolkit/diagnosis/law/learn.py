@@ -16,6 +16,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.fit import sizes_off
 from toolkit.diagnosis.fit.folds import hold_out, matters
+from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
 from toolkit.diagnosis.law.terms import pulses_of, terms_of
@@ -135,7 +136,17 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     motion = problem.model.capability.motion
     solved = motion is not None and motion.integrates
     affected = {part.output for part in structure if solved or part.is_lawful or part.is_too_large}
-    return tuple(name for name in problem.names if strained or name in affected)
+    return tuple(
+        name for name in problem.names if strained or name in affected or _wanders(problem, base, name)
+    )
+
+
+def _wanders(problem: Problem, base: Fit, name: str) -> bool:
+    """Tell whether an output's rest is more than its sensor's noise: its colour may be physics left out."""
+    if not problem.kept[name].any():
+        return False
+    part = noise_parts(problem, base, name)
+    return part.process_sd > part.sensor_sd and not part.is_sensor
 
 
 def _next(

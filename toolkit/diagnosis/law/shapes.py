@@ -114,6 +114,8 @@ ONE: tuple[Shape, ...] = (
     _static("a*sign({x})", a="{y}"),
     _static("a*tanh(({x} - c)/s)", _bends, a="{y}", c="{x}", s="{x}"),
     _static("a*exp(-((({x} - c)/w)**2))", _bumps, a="{y}", c="{x}", w="{x}"),
+    # A latch: the slope of a bump of energy pushes back before it and pulls on behind it.
+    _static("a*({x} - c)*exp(-((({x} - c)/w)**2))", _bumps, a="{y}/{x}", c="{x}", w="{x}"),
     _static("a*exp({x}/d)", _growths, a="{y}", d="{x}"),
     _static(
         f"a1*sin({_TURN}*{{x}}/period) + a2*cos({_TURN}*{{x}}/period)", _periods, a1="{y}", a2="{y}",
@@ -150,6 +152,15 @@ REMEMBERING: tuple[Shape, ...] = (
         about_zero=False,
     ),
 )  # fmt: skip
+BESIDE: tuple[Shape, ...] = (
+    REMEMBERING[0],
+    REMEMBERING[1],
+    Shape(
+        form="mode", text="a*({x} - mode({x}, frequency, damping))", starts=_modes, about_zero=False,
+        units={"a": "{y}/{x}", "frequency": "Hz", "damping": "1"},
+    ),
+)  # fmt: skip
+"""Shapes in the equation of a state: what follows a signal late, or swings beside it, and pulls at it."""
 TONE = Shape(
     form="tone", units={"a1": "{y}", "a2": "{y}", "frequency": "Hz"},
     text=f"a1*sin({_TURN}*frequency*[time]) + a2*cos({_TURN}*frequency*[time])",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.law.ranking import all_responses
-from toolkit.diagnosis.law.shapes import ALIKE, ONE, TWO, Shape, pulse
+from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, ONE, TWO, Shape, pulse
 from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
 from toolkit.diagnosis.search.case_view import CaseView
@@ -44,6 +44,7 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
         arguments: list[tuple[Shape, tuple[Signal, ...]]] = [
             (shape, (signal,)) for signal in listed for shape in ONE
         ]
+        arguments += [(shape, (signal,)) for signal in steady for shape in BESIDE]
         for pair in itertools.combinations(steady, 2):
             alike = pair[0].unit == pair[1].unit
             arguments += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]

@@ -162,12 +162,11 @@ def trial_at(
     values: dict[str, float] = {name: start.get(name, 0.0) for name in effect.names}
     if acts != "enters" and itself is not None:
         values |= conversion(ITSELF, unit(itself).factor, 0.0)
+    drivers = {driver.name for driver in case.drivers}
     for signal in signals if acts != "enters" else ():
-        if any(driver.name in signal.written for driver in case.drivers):
-            name = signal.written[signal.written.index("[") + 1 : signal.written.index("]")]
-            if name != ITSELF:
-                stated = unit(case.unit(name))
-                values |= conversion(name, stated.factor, stated.offset)
+        for name in drivers.intersection(formula(signal.written).signals):
+            stated = unit(case.unit(name))
+            values |= conversion(name, stated.factor, stated.offset)
     return Trial(
         unit=y,
         shape=shape, signals=signals, acts=acts,
@@ -224,7 +223,21 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
     if timed:
         times = np.concatenate([run.t for run in problem.runs])
         listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))
-    return tuple(listed)
+    return tuple(each for each in listed if each.name == output or not _is_record_of(problem, output, each))
+
+
+def _is_record_of(problem: Problem, output: str, signal: Signal) -> bool:
+    """Tell whether a signal is an output that was recorded in another way: it foretells nothing of it.
+
+    The rate of a recorded position is the velocity that a simulation is to give, whatever that leaves out.
+    """
+    recorded, own = unit(signal.unit), unit(channel_unit(problem.case, problem.model, output))
+    if recorded.dimension != own.dimension:
+        return False
+    kept = problem.kept[output]
+    y = (problem.observed[output] * own.factor + own.offset)[kept]
+    off = y - (signal.values * recorded.factor + recorded.offset)[kept]
+    return float(np.mean(off**2)) < LAWS.itself * float(np.var(y))
 
 
 def _way(problem: Problem, name: str, text: str, speed: Array) -> Signal:

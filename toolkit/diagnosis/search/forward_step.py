@@ -312,16 +312,23 @@ def joint_fit(
 
     Screening is linear: the size to which it leads may be beyond what a simulation can run with, where the
     true one is not. An effect that changes an answer's shape begins at the declared parameters as well, where
-    a refit without it has moved them: they may have gone where it no longer helps. Where it was seen with
-    parameters of its own, it begins at these (``begin``). A fit whose log-posterior cannot reach ``least`` is
-    not ended.
+    a refit without it has moved them: they may have gone where it no longer helps. So does any whose fit ends
+    with a parameter that nobody believes: what is of one form with a part of the simulation may have changed
+    places with it, a filter's lag with the plant's own. Where it was seen with parameters of its own, it
+    begins at these (``begin``). A fit whose log-posterior cannot reach ``least`` is not ended.
     """
     starts = [base.p if begin is None else begin]
     moved = float(np.abs(problem.off_priors(base.p)).max(initial=0.0))
     if begin is None and moved > PRIORS.moved and any(effect.effect.misleads for effect in added):
         starts.append(tuple(parameter.value for parameter in problem.free))
     fits = [_fitted(problem, base, added, start, plain, least) for start in starts]
-    return max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)
+    best = max((fitted for fitted in fits if fitted), key=lambda fitted: fitted.log_posterior, default=None)
+    declared = tuple(parameter.value for parameter in problem.free)
+    if best is None or declared in starts or not np.any(np.abs(problem.off_priors(best.p)) > PRIORS.far):
+        return best
+    small = tuple(_shared(effect, 0.25) for effect in added)
+    again = _fitted(problem, base, small, declared, plain, max(least, best.log_posterior))
+    return best if again is None or again.log_posterior < best.log_posterior else again
 
 
 def _fitted(

@@ -89,6 +89,11 @@ class Equation:
             raise failed(self.case, run, f"initial gives an array of shape {start.shape}, not one of states")
         return start
 
+    def begun(self, run: Run, start: Array, forces: Forces) -> Array:
+        """Return the states that forces bring along at a run's first row, (added,)."""
+        first = {name: float(run.columns[name][0]) for name in self._drivers}
+        return forces.start(start, {**first, TIME: float(run.t[0])})
+
     def failure(self, function: str, error: BaseException, run: Run, p: Mapping[str, float]) -> FitError:
         """Return the error of what a function of the file raised, with the names that it was given."""
         beside = {"run": tuple(_as_dict(run))} if function == "initial" else {"u": self._drivers}

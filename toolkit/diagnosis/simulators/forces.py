@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from toolkit.arrays import Array
     from toolkit.effects.applied import Conditioned, EffectKey
+    from toolkit.effects.law import Remembered
 
     Places = NDArray[np.intp]
     Seen = Mapping[str, Any]
@@ -39,6 +40,8 @@ class Force:
     the equation is it; ``scale`` is the size of the velocity state (of the state itself, where it has no
     position). ``reads`` are the signals of a law by name, with the place of those that are states; ``feeds``
     is the state to which a part of what is held back may come; ``dry`` are size and reach of a bristle.
+    ``memory`` is the place of the first of the states by which its law remembers, ``followed`` the size of
+    what it reads.
     """
 
     velocity: int
@@ -50,6 +53,22 @@ class Force:
     reads: tuple[tuple[str, int | None], ...] = ()
     feeds: int | None = None
     dry: tuple[Any, Any] | None = None
+    memory: int | None = None
+    followed: float = 1.0
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """What tells forces apart that are not of one kind at one place."""
+        return self.velocity, self.position, self.bristle, self.way, self.memory, self.active.key
+
+    @property
+    def remembered(self) -> tuple[tuple[Remembered, slice], ...]:
+        """What its law remembers, and where that stands among the added states."""
+        parts, at = [], self.memory or 0
+        for part in _remembered(self.active):
+            parts.append((part, slice(at, at + part.states)))
+            at += part.states
+        return tuple(parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +97,15 @@ class Forces:
         made, added = [], 0
         for one in active:
             at = states.index(str(one.channel))
-            bristle = way = None
+            bristle = way = memory = None
             dry = _dry(one)
             if dry is not None and dry[1] > 0:
                 bristle, added = added, added + 1
                 if at not in derivative_of:
                     way, added = added, added + 1
+            reads = _reads(one, states, at, derivative_of.get(at, at), inputs)
+            if remembered := _remembered(one):
+                memory, added = added, added + sum(part.states for part in remembered)
             made.append(
                 Force(
                     velocity=at,
@@ -92,9 +114,11 @@ class Forces:
                     way=way,
                     scale=scale[states[at]][1],
                     active=one,
-                    reads=_reads(one, states, at, derivative_of.get(at, at), inputs),
+                    reads=reads,
                     feeds=(feeds or {}).get(at),
                     dry=dry if bristle is not None else None,
+                    memory=memory,
+                    followed=_followed(reads, states, scale),
                 )
             )
         return Forces(tuple(made), added)
@@ -119,12 +143,31 @@ class Forces:
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """Sizes of the added states: of a bend that of sliding, of a way the bristle's reach."""
+        """Sizes of the added states: of a bend that of sliding, of a way the bristle's reach.
+
+        What a law remembers has the size of what it follows.
+        """
         made = [1.0] * self.added
         for one in self.listed:
+            for part, at in one.remembered:
+                made[at] = part.sizes(one.followed, one.active.values)
             if one.way is not None and one.dry is not None:
                 made[one.way] = one.dry[1]
         return tuple(made)
+
+    def start(self, x: Array, seen: Seen) -> Array:
+        """Return the added states at the first row, (added,): at rest, with what they follow where they do.
+
+        Parameters
+        ----------
+        x : the equation's own states, (states,)
+        seen : the inputs and the time
+        """
+        begun = np.zeros(self.added)
+        for one in self.listed:
+            for part, at in one.remembered:
+                begun[at] = part.start(_signals(one, x, seen), one.active.values)
+        return begun
 
     def add(self, x: Array, rate: Array, own: int, seen: Seen) -> None:
         """Add the forces to the rates of ``own`` states, and set those of the added ones, in place.
@@ -149,16 +192,35 @@ def _reads(
     one: AppliedEffect, states: Sequence[str], at: int, position: int, inputs: Sequence[str]
 ) -> tuple[tuple[str, int | None], ...]:
     term = one.effect.term
+    read = () if term is None or term.law is None else term.law.signals
     places: dict[str, int | None] = dict.fromkeys((*inputs, TIME))
     places |= {name: i for i, name in enumerate(states)} | {ITSELF: at, POSITION: position}
-    unknown = [name for name in (term.reads if term is not None else ()) if name not in places]
+    unknown = [name for name in read if name not in places]
     if unknown:
         raise ConfigError(
             "a law in an equation reads what the equation does not have", where=one.key.label,
             got=", ".join(unknown), expected=", ".join((*states, *inputs, TIME)),
             next_step="give the model the simulation and the inputs that it was made for", rule="model-place",
         )  # fmt: skip
-    return tuple((name, places[name]) for name in (term.reads if term is not None else ()))
+    return tuple((name, places[name]) for name in read)
+
+
+def _followed(
+    reads: tuple[tuple[str, int | None], ...], states: Sequence[str], scale: Mapping[str, tuple[float, float]]
+) -> float:
+    """Return the size of what a law reads first."""
+    named = [name if at is None else states[at] for name, at in reads]
+    return scale.get(named[0], (1.0, 1.0))[1] if named else 1.0
+
+
+def _remembered(applied: AppliedEffect) -> tuple[Remembered, ...]:
+    term = applied.effect.term
+    return term.law.remembered if term is not None and term.law is not None else ()
+
+
+def _signals(force: Force, x: Array, seen: Seen) -> dict[str, Any]:
+    """Return what a law reads."""
+    return {name: seen[name] if at is None else x[at] for name, at in force.reads}
 
 
 def _add(force: Force, x: Array, rate: Array, own: int, seen: Seen) -> None:
@@ -180,7 +242,11 @@ def _add(force: Force, x: Array, rate: Array, own: int, seen: Seen) -> None:
         if force.way is not None:
             rate[own + force.way] = v
     elif term.law is not None:
-        signals = {name: seen[name] if at is None else x[at] for name, at in force.reads}
+        signals = _signals(force, x, seen)
+        for part, at in force.remembered:
+            there = slice(own + at.start, own + at.stop)
+            rate[there] = part.rates(x[there], signals, values)
+            signals[part.key] = x[there.start]
         rate[i] -= term.law(signals, values)
     elif term.force is not None:
         rate[i] -= term.force(x[force.position], x[i], values)
@@ -198,8 +264,7 @@ class ForcesTogether:
         groups: dict[object, list[tuple[int, Force]]] = {}
         for k, forces in enumerate(sets):
             for force in forces.listed:
-                place = (force.velocity, force.position, force.bristle, force.way, force.active.key)
-                groups.setdefault((*place, *force.active.values), []).append((k, force))
+                groups.setdefault((*force.place, *force.active.values), []).append((k, force))
         self._groups = []
         self.abrupt = np.zeros(len(sets), dtype=bool)  # what turns, or runs against a limit
         for members in groups.values():

@@ -79,6 +79,10 @@ class OdeModel:
         self.outputs = tuple(Output(name=one.name, unit=one.unit, sd=one.sd) for one in case.outputs)
         self.drivers = tuple(driver.name for driver in case.drivers)
         self._inputs = {driver.name for driver in case.drivers if driver.role == "input"}
+        self._driver_sizes = {
+            name: (1.0, max(float(np.ptp(run.columns[name])) for run in case.runs) or 1.0)
+            for name in self.drivers
+        }
         self._driven: dict[Any, Run] = {}
         self._recorded: dict[Run, Run] = {}  # of a run with other inputs: a guess of one is one of the other
         self._settings: dict[Run, Setting] = {}
@@ -242,8 +246,8 @@ class OdeModel:
             return through_channels(simulated, active, run, self.setting(run), run.columns)
         # An equation's outputs have a corner at each row, where its inputs have one.
         fine = [
-            replace(applied, values={**applied.values, STRAIGHT: 1.0}) if _between_rows(applied) else applied
-            for applied in active
+            replace(each, values={**each.values, STRAIGHT: 1.0}) if each.effect.reads_between_rows else each
+            for each in active
         ]
         finer = self.finer(run)
         shown = through_channels(simulated, fine, finer, self.setting(finer), finer.columns)
@@ -338,6 +342,8 @@ class OdeModel:
         for run, at, start in zip(runs, rows.slices, starts, strict=True):
             x[:own, :, at] = self._near[run][:, None] if run in self._near else start[:, :, None]
             x[:own, :, at.start] = start
+            for k, force in enumerate(forces):
+                x[own : own + force.added, k, at] = self.equation.begun(run, start[:, k], force)[:, None]
             steps[at.start : at.stop - 1] = self._guesses.steps(run, terms, self._steps.get(run, 1))
         last = self._nodes.get(runs)
         sizes = np.array(
@@ -375,7 +381,7 @@ class OdeModel:
         forces = [
             applied for applied in active if applied.effect.stage == "dynamics" and applied.acts_in(run)
         ]
-        between = any(_between_rows(applied) and applied.acts_in(run) for applied in active)
+        between = any(applied.effect.reads_between_rows and applied.acts_in(run) for applied in active)
         return (run, between and run.rows > 1, tuple(p.values()), _forces_key(forces)), forces
 
     def integrated(
@@ -400,7 +406,7 @@ class OdeModel:
                 (states,), reached = self._solved([run], [(p, forces)])
                 if reached[0]:
                     return np.ascontiguousarray(states[:, 0])
-        begun = np.concatenate([start, np.zeros(acting.added)])
+        begun = np.concatenate([start, self.equation.begun(run, start, acting)])
         try:
             with silenced():
                 atol = self.tolerance(start, acting, acting.added)
@@ -423,7 +429,8 @@ class OdeModel:
 
     def forces(self, active: Sequence[AppliedEffect]) -> Forces:
         """Return effects as forces on the equation's states."""
-        return Forces.of(active, self.states, self.derivative_of, self.scale, self.drivers, self.feeds)
+        sizes = {**self._driver_sizes, **self.scale}
+        return Forces.of(active, self.states, self.derivative_of, sizes, self.drivers, self.feeds)
 
     def _made(
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], x: NDArray[np.float64],
@@ -490,8 +497,3 @@ def _loaded(case: Case) -> OdeModel:
 
 def _forces_key(forces: Sequence[AppliedEffect]) -> tuple[Any, ...]:
     return tuple((force.effect.name, force.channel, tuple(force.values.values())) for force in forces)
-
-
-def _between_rows(applied: AppliedEffect) -> bool:
-    """Tell whether an effect shows what the equation did between two rows."""
-    return applied.effect.on_channel is not None and applied.effect.on_channel.between_rows

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from toolkit.effects.law import ITSELF, POSITION
+from toolkit.effects.law import ITSELF, POSITION, TIME
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class TermPattern:
                 columns.append(term.pattern(x, starts))
                 continue
             if term.law is not None:
-                made = [term.law(signals, values) for values in starts]
+                made = [term.law(signals, values, signals[TIME]) for values in starts]
             else:
                 assert term.force is not None  # noqa: S101
                 made = [term.force(x, v, values) for values in starts]

@@ -71,6 +71,8 @@ class Turning:
         starts = np.zeros((own + together.added, len(listed), len(runs)))
         for k, run in enumerate(runs):
             starts[:own, :, k] = np.stack([model.equation.start(run, values) for values, _ in listed], axis=1)
+            for i, one in enumerate(acting):
+                starts[own : own + one.added, i, k] = model.equation.begun(run, starts[:own, i, k], one)
         values = {name: np.array([each[name] for each, _ in listed], dtype=float) for name in p}
         atol = np.stack([model.tolerance(starts[:own, 0, 0], one, one.added) for one in acting], axis=1)
         flow = RowFlow(columns, rows, values, together, atol)
@@ -210,10 +212,7 @@ def beside(flow: RowFlow, x: Array, starts: Array, sizes: Array) -> tuple[Array,
 
 
 def _places(forces: Forces) -> list[object]:
-    return [
-        (force.velocity, force.position, force.bristle, force.way, force.active.key)
-        for force in forces.listed
-    ]
+    return [force.place for force in forces.listed]
 
 
 def _turning(forces: Forces) -> list[object]:

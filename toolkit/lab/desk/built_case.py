@@ -7,7 +7,6 @@ What headers and units tell is guessed (`toolkit.lab.starters`); the rest is sta
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -26,7 +25,15 @@ from toolkit.files import parse_toml, toml_entries, write_atomic
 from toolkit.inputs import NAMED_FILE, RECORDING_FILE, SETTINGS_FILE, check_size, read_input
 from toolkit.lab.desk.holdings import CASE
 from toolkit.lab.desk.statements import Group, statement_groups, with_entry, with_statement, without_entry
-from toolkit.lab.desk.uploads import CASES, check_inside, enter_case, leading_out, named_files, not_those
+from toolkit.lab.desk.uploads import (
+    CASES,
+    check_inside,
+    enter_case,
+    leading_out,
+    named_files,
+    namesakes,
+    not_those,
+)
 from toolkit.lab.starters import guess_case, headers_of
 from toolkit.publication import publication
 from toolkit.recording.sniff import sniff
@@ -102,7 +109,7 @@ def add_files(folder: Path, files: Files) -> None:
         ``usage``: no file, or names that are none or taken; nothing is written
     """
     contents = _sized(named_files(files, _EXPECTED))
-    occupied = [name for name in contents if os.path.lexists(folder / name)]
+    occupied = list(namesakes(folder, contents).values())
     if occupied or not contents:
         raise not_those("new files", occupied, "files with names that the case has not yet")
     with publication(folder) as stage:

@@ -19,7 +19,7 @@ from toolkit.inputs import NAMED_FILE, SETTINGS_FILE, TEMPLATE_FILE, check_size
 from toolkit.lab.desk.holdings import CASE
 from toolkit.lab.desk.previews import WORD
 from toolkit.lab.home import TEMPLATES
-from toolkit.publication import publication
+from toolkit.publication import caseless, publication
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.case.case import Case
@@ -90,10 +90,12 @@ def hand_in_template(home: Path, files: Sequence[tuple[str, bytes]], *, replace:
     for name in style:
         check_size(contents[name], SETTINGS_FILE, name)
     folder = home / TEMPLATES
-    occupied = next((name for name in contents if os.path.lexists(folder / name)), None)
-    if occupied is not None and not replace:
+    occupied = next(iter(namesakes(folder, contents).items()), None)
+    if occupied is not None and not (replace and occupied[0] == occupied[1]):
+        name, namesake = occupied
+        got = "another of that name" if name == namesake else f"{namesake}, which differs by case alone"
         raise ConfigError(
-            "the home has a file of this name", where=f"{TEMPLATES}/{occupied}", got="another of that name",
+            "the home has a file of this name", where=f"{TEMPLATES}/{name}", got=got,
             expected="a new name, or consent to replace it",
             next_step="name the file anew, or agree to replace it; nothing was written", rule="usage",
         )  # fmt: skip
@@ -187,9 +189,21 @@ def leading_out(table: Any, folder: Path, names: Collection[str]) -> list[str]:
 def named_files(files: Sequence[tuple[str, bytes]], expected: str) -> dict[str, bytes]:
     """Return files by name, each of its own; a name leads to no other folder."""
     contents = dict(files)
-    if len(contents) < len(files) or not all(FILE_NAME.match(name) for name in contents):
+    if len({caseless(name) for name in contents}) < len(files) or not all(
+        FILE_NAME.match(name) for name in contents
+    ):
         raise not_those("files with names of their own", [name for name, _ in files], expected)
     return contents
+
+
+def namesakes(folder: Path, names: Collection[str]) -> dict[str, str]:
+    """Return of each name that is taken in a folder the one that stands there: some disks tell no case."""
+    taken = [path.name for path in folder.iterdir()] if folder.is_dir() else []
+    return {
+        name: min(alike, key=lambda other: other != name)
+        for name in names
+        if (alike := [other for other in taken if caseless(other) == caseless(name)])
+    }
 
 
 def _enter(folder: Path, files: Mapping[str, bytes], read: Callable[[Path], None]) -> None:

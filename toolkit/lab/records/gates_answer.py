@@ -148,26 +148,14 @@ def gates_answer(registry: Registry, record_id: str) -> Judged:
         _CHECK: stored_check(registry.folder, record) is not None,
         _SESSION: record.kind == "fit",
     }
-    gates: list[Gate] = [
-        {
-            "rule": result.rule,
-            "state": _STATES[result.effect],
-            "where": result.where,
-            "message": result.message,
-        }
-        for result in judged.results
-    ]
+    gates = [entry_of(Gate, result, state=_STATES[result.effect]) for result in judged.results]
     judged_rules = {result.rule for result in judged.results}
     of_session = {rule: _SESSION for rule, entry in rules_catalogue().items() if "refuses" in entry}
     for rule, need in {**of_session, **GATES}.items():
         if rule not in judged_rules:
             judgeable = need is None or present[need]
-            gates.append(
-                {
-                    "rule": rule, "state": "pass" if judgeable else "not judged", "where": "",
-                    "message": "" if judgeable else f"it needs {need}",
-                }
-            )  # fmt: skip
+            state, message = ("pass", "") if judgeable else ("not judged", f"it needs {need}")
+            gates.append({"rule": rule, "state": state, "where": "", "message": message})
     return {
         "id": record_id,
         "compared_with": None if before is None else before.id,
@@ -196,14 +184,7 @@ def as_found_answer(registry: Registry, record_id: str) -> Found:
     if result is None:
         return {"phase": phase, "session": None, "record": None, "loads": [], "within": None,
                 "reason": "no as-found session belongs to this as-left one"}  # fmt: skip
-    return {
-        "phase": phase,
-        "session": result.session_record,
-        "record": result.record,
-        "within": result.within,
-        "reason": result.reason,
-        "loads": [entry_of(FoundLoad, load) for load in result.loads],
-    }
+    return entry_of(Found, result, phase=phase, session=result.session_record)
 
 
 def responses_answer(registry: Registry, record_id: str) -> Responses:

@@ -349,8 +349,8 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent
             check_max=misses.get(load.load),
         )  # fmt: skip
         terms = [
-            [term, repr(c), repr(i), "-" if u is None else round_uncertainty(u)]
-            for term, c, i, u in zip(load.terms, load.coefficients, load.issued, errors, strict=True)
+            [term, repr(c), i, "-" if u is None else round_uncertainty(u)]
+            for term, c, i, u in zip(load.terms, load.coefficients, load.issued_texts, errors, strict=True)
         ]
         lines += [
             "",

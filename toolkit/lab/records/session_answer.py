@@ -251,11 +251,11 @@ def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
         stored = record.load(load.setting.name)
         units = dict(zip(record.indications, record.indication_units, strict=True))
         rows = [
-            [term, f"{c:.10g}", f"{i:.8g}", round_uncertainty(u), _per(term, load.setting.unit, units)]
+            [term, f"{c:.10g}", i, round_uncertainty(u), _per(term, load.setting.unit, units)]
             for term, c, i, u in zip(
                 load.fit.terms,
                 load.fit.coefficients,
-                stored.issued,
+                stored.issued_texts,
                 standard_errors(record, stored.load),
                 strict=True,
             )

@@ -28,7 +28,7 @@ from toolkit.calibration.registry.store import Change
 from toolkit.errors import ConfigError, RegistryError, TrustError
 from toolkit.files import sha256_file
 from toolkit.inputs import PDF_FILE, read_input
-from toolkit.lab.signatures.proofs import PROOF, TESTED
+from toolkit.lab.signatures.proofs import MANIFEST, PROOF, TESTED, statements_hash
 from toolkit.trust.people import Person, Version, inability, objections
 from toolkit.trust.signing import HERE
 
@@ -160,9 +160,9 @@ def issue(
     return numbers[-1]
 
 
-Issue = Callable[[Path, Sequence[Path], int, str], Mapping[str, Any]]
-"""Issues a PDF of so many pages in place, with the files that are handed over with it and the hash of what it
-says; returns the ledger's proof."""
+Issue = Callable[[Path, Sequence[Path], int, str, Mapping[str, Any] | None], Mapping[str, Any]]
+"""Issues a PDF of so many pages in place, with the files that are handed over with it, the hash of what it
+says and what its manifest says, where it has one; returns the ledger's proof."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,7 +201,7 @@ class Issuing:
 
     def _issue(
         self, content: ReportContent, stated: Mapping[str, str], decided: str,
-        pdf: Path, others: Sequence[Path], pages: int, digest: str,
+        pdf: Path, others: Sequence[Path], pages: int, digest: str, manifest: Mapping[str, Any] | None,
     ) -> Mapping[str, Any]:  # fmt: skip
         from toolkit.recording.marks import GENERATOR
         from toolkit.report.word.closing import place_of_symbol
@@ -223,6 +223,8 @@ class Issuing:
             "files": [{"name": file.name, "sha256": sha256_file(file)} for file in others],
             "ledger": ledger,
         }
+        if manifest is not None:
+            proof[MANIFEST] = statements_hash(manifest)
         text = json.dumps(proof, ensure_ascii=False, indent=1).encode() + b"\n"
         data = proved_pdf(read_input(pdf, PDF_FILE), {PROOF: text}, anchor.compact, place)
         pdf.write_bytes(data if self.sealing is None else self.sealing.seal_pdf(data, stated["name"]))

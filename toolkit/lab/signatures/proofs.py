@@ -7,6 +7,7 @@ alone, and its signer is nobody that is known here.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
@@ -17,7 +18,7 @@ from toolkit.calibration.records.use import UNSIGNED
 from toolkit.calibration.registry.witnessed import ORIGIN, witnessed
 from toolkit.days import parse_day
 from toolkit.errors import ToolkitError
-from toolkit.files import parse_json
+from toolkit.files import parse_json, sha256_bytes
 from toolkit.trust.anchor import COMPACT, Anchor, compare, parse_anchor, parse_compact
 from toolkit.trust.seal.check import Signature
 
@@ -32,6 +33,11 @@ TESTED = "tested"
 """Key of the day of the test, in the entry of a report and in its manifest."""
 PROOF = "toolkit.json"
 """Name of the JSON document in an issued PDF: its records, its ledger's proof, the files issued with it."""
+
+MANIFEST = "manifest"
+"""In it, the hash of what the manifest beside the PDF says."""
+_BESIDE_WHAT_IT_SAYS = ("outputs", "ledger")
+"""Of a manifest: the files, whose hashes are proved one by one, and the proof itself."""
 
 Continuity = Literal["continues", "forked", "rolled_back", "unknown"]
 _NO_LEDGER = "no ledger here knows its records"
@@ -124,6 +130,12 @@ def hashes_of(anchor: Anchor) -> Mapping[str, str]:
     """Return the hashes that the entry of an issued document holds of its files, by name."""
     document = _document_of(anchor)
     return {n: str(value) for n, value in document.items() if n not in ("name", "content", TESTED)}
+
+
+def statements_hash(manifest: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of what a manifest says beside the files that it lists and its proof."""
+    said = {name: value for name, value in manifest.items() if name not in _BESIDE_WHAT_IT_SAYS}
+    return sha256_bytes(json.dumps(said, sort_keys=True, separators=(",", ":")).encode())
 
 
 def day_of_test(anchor: Anchor | None, stated: object = None) -> date | None:
@@ -342,7 +354,8 @@ def _not_entered(registry: Registry, record_id: str, digest: str) -> str | None:
     """Return why a file is not the one that the ledger's entry of a record holds the hash of."""
     from toolkit.calibration.registry.registry import instrument_of
 
-    entry = registry.ledger(instrument_of(record_id)).entered().get(record_id)
+    ledger = registry.ledger(instrument_of(record_id))
+    entry = None if ledger.damage is not None else ledger.entered().get(record_id)
     entered = None if entry is None else entry.file
     if entered is None or entered == digest:
         return None
@@ -360,6 +373,9 @@ def _standing(registry: Registry, name: Named) -> LedgerState:
             return LedgerState()
     except ToolkitError:
         return LedgerState()  # no name of a record
+    # Asked before the record is loaded: what here fails to load may be the file that is asked about.
+    if name.file is not None and (changed := _not_entered(registry, name.record, name.file)) is not None:
+        return LedgerState(still_holds=False, why=changed, changed=changed)
     try:
         record = registry.load(name.record)
         status, signed = registry.status(name.record), registry.signature(name.record)
@@ -370,8 +386,6 @@ def _standing(registry: Registry, name: Named) -> LedgerState:
     decided_by = None if signed == UNSIGNED else signed
     if record.sha256 != name.sha256:
         return LedgerState(still_holds=False, why=f"record {name.record} here is another one")
-    if name.file is not None and (changed := _not_entered(registry, name.record, name.file)) is not None:
-        return LedgerState(still_holds=False, why=changed, changed=changed)
     reason = f": {status.reason}" if status.reason else ""
     if name.report and not status.void_always:
         return _on_its_day(registry, name, status, decided_by)

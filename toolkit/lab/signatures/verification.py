@@ -22,6 +22,7 @@ from toolkit.files import parse_json, sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
 from toolkit.lab.answers import one_line
 from toolkit.lab.signatures.proofs import (
+    MANIFEST,
     PROOF,
     TESTED,
     Continuity,
@@ -34,6 +35,7 @@ from toolkit.lab.signatures.proofs import (
     ledger_file_state,
     no_ledger,
     reports_test,
+    statements_hash,
 )
 from toolkit.trust.anchor import COMPACT, Anchor, parse_anchor
 from toolkit.trust.seal.check import SealCheck, Signature
@@ -126,11 +128,16 @@ def verify_file(path: Path, trust: Trust, *, ledger: Ledger = no_ledger) -> Verd
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Carried:
-    """What an issued PDF carries: what it is, its records, the hashes of the files beside it, its proof."""
+    """What an issued PDF carries: what it is, its records, the hashes of the files beside it, its proof.
+
+    ``manifest`` is the hash of what the manifest beside it says, None where it has none or an older version
+    made it.
+    """
 
     document: str | None = None
     names: tuple[Named, ...] = ()
     files: Mapping[str, str]
+    manifest: str | None = None
     anchor: Anchor | None = None
 
     @property
@@ -163,12 +170,16 @@ def carried(attachments: Mapping[str, bytes], *, where: object) -> Carried:
         records = [(str(r["id"]), str(r["sha256"])) for r in document.get("records", ())]
         files = {str(f["name"]): str(f["sha256"]) for f in document.get("files", ())}
         title, proof, stated = document.get("document"), document.get("ledger"), document.get(TESTED)
+        said = document.get(MANIFEST)
     except (ValueError, RecursionError, AttributeError, TypeError, KeyError):
         return Carried(files={})
     anchor = parse_anchor(proof, where=where) if isinstance(proof, dict) else None
     report, tested = reports_test(title), day_of_test(anchor, stated)
     names = tuple(Named(record=r, sha256=digest, report=report, tested=tested) for r, digest in records)
-    return Carried(document=title and str(title), names=names, files=files, anchor=anchor)
+    return Carried(
+        document=title and str(title), names=names, files=files, anchor=anchor,
+        manifest=None if said is None else str(said),
+    )  # fmt: skip
 
 
 def _pdf(path: Path, data: bytes, trust: Trust, ledger: Ledger) -> Verdict:
@@ -275,12 +286,12 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         if Path(name).name != name:
             raise _unreadable(path, f"an output outside its folder: {name}")
         try:
-            actual = sha256_bytes(_content(path.parent / name))
+            data = _content(path.parent / name)
         except TrustError as error:
             why = f"{name}, which it lists, cannot be read beside it: {error.got}"
             return Verdict(file=str(path), kind="manifest", why=why)
-        if actual != digest:
-            why = f"{name} was changed: its hash is {actual[:12]}"
+        if (actual := sha256_bytes(data)) != digest or output.get("bytes", len(data)) != len(data):
+            why = f"{name} was changed: its hash is {actual[:12]}, its length {len(data)} bytes"
             return Verdict(file=str(path), kind="manifest", why=why)
         hashes[name] = digest
     for name in hashes:
@@ -291,10 +302,20 @@ def _manifest(path: Path, document: dict[str, Any], trust: Trust, ledger: Ledger
         if check.signature == "unsigned":
             continue
         verdict = _verdict(path, "manifest", check, proof, proof.document, ledger)
-        if proof.files == {file: digest for file, digest in hashes.items() if file != name}:
-            return replace(verdict, why=f"{len(hashes)} files as listed, proved by {name}: {verdict.why}")
-        why = f"{name} was issued with other files than it lists"
-        return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
+        if proof.files != {file: digest for file, digest in hashes.items() if file != name}:
+            why = f"{name} was issued with other files than it lists"
+            return Verdict(file=str(path), kind="manifest", signature="unsigned", why=why)
+        why = f"{len(hashes)} files as listed, proved by {name}: {verdict.why}"
+        if verdict.signature == "invalid":
+            return replace(verdict, why=why)
+        if proof.manifest is None:
+            why = f"{name} proves the files that it lists, and nothing else that it says; {verdict.why}"
+            return replace(verdict, signature="unsigned", why=why)
+        ledger_proof = None if proof.anchor is None else {"schema": 1, **proof.anchor.as_dict()}
+        if proof.manifest != statements_hash(document) or document.get("ledger") != ledger_proof:
+            why = f"what it says was changed since it was issued with {name}"
+            return Verdict(file=str(path), kind="manifest", over=proof.document, why=why)
+        return replace(verdict, why=why)
     check = SealCheck(signature="unsigned", why=f"{len(hashes)} files as listed; no sealed PDF proves it")
     content = {
         "ledger": document.get("ledger"), "records": document.get("calibrations", []),

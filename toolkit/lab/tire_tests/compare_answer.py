@@ -19,7 +19,6 @@ from toolkit.lab.answers import (
     delivered_keys,
     document_table,
     draft_keys,
-    estimate_keys,
     finding_lines,
     mark_words,
     signature_words,
@@ -178,31 +177,19 @@ def compare_answer(
 ) -> CompareAnswer:
     """Return a comparison as the JSON answer, in SI (angles in rad, stiffness per rad) and SAE axes."""
     repeats = comparison.repeats
-    return {
-        "mode": comparison.mode,
-        "axes": "SAE",
-        "level": comparison.level,
-        "reference": comparison.reference.label,
+    return entry_of(
+        CompareAnswer, comparison,
+        axes="SAE",
+        reference=comparison.reference.label,
+        entries=[_entry(entry) for entry in comparison.entries],
+        differences=[_difference(difference) for difference in comparison.differences],
+        significant=sum(difference.significant for difference in comparison.differences),
+        repeats=None if repeats is None else _repeats(repeats),
+        pattern_effect=[entry_of(PatternEffect, pull, quantity=pull.name) for pull in comparison.pattern],
+        findings=[finding.as_dict() for finding in findings],
         **draft_keys(*comparison.uses),
-        "entries": [_entry(entry) for entry in comparison.entries],
-        "differences": [_difference(difference) for difference in comparison.differences],
-        "significant": sum(difference.significant for difference in comparison.differences),
-        "repeats": None if repeats is None else _repeats(repeats),
-        "pattern_effect": [
-            {
-                "quantity": effect.name,
-                "load_N": effect.load_N,
-                "regular": estimate_keys(effect.regular),
-                "reversed": estimate_keys(effect.reversed),
-                "pattern": estimate_keys(effect.pattern),
-                "body": estimate_keys(effect.body),
-            }
-            for effect in comparison.pattern
-        ],
-        "left_out": list(comparison.left_out),
-        "findings": [finding.as_dict() for finding in findings],
         **written_keys(drawn, document, timing),
-    }
+    )  # fmt: skip
 
 
 def written_keys(drawn: Mapping[str, Path], document: Delivered | None, timing: Timing) -> WrittenComparison:
@@ -224,20 +211,17 @@ def _difference(difference: Difference) -> DifferenceEntry:
     return entry_of(
         DifferenceEntry, difference,
         table=difference.part, quantity=difference.name,
-        reference=estimate_keys(difference.reference), other=estimate_keys(difference.other),
-        difference=estimate_keys(difference.difference),
         difference_percent=100 * difference.difference.value / abs(base) if base else None,
         standard_uncertainty_if_nothing_were_shared=difference.u_apart,
     )  # fmt: skip
 
 
 def _repeats(repeats: Repeats) -> RepeatsEntry:
-    return {
-        "factors": [entry_of(FactorEntry, factor, factor=factor.name) for factor in repeats.factors],
-        "reproducibility": repeats.reproducibility,
-        "reproducibility_note": repeats.reproducibility_note,
-        "precision": [_precision_entry(precision) for precision in repeats.precisions],
-    }
+    return entry_of(
+        RepeatsEntry, repeats,
+        factors=[entry_of(FactorEntry, factor, factor=factor.name) for factor in repeats.factors],
+        precision=[_precision_entry(precision) for precision in repeats.precisions],
+    )  # fmt: skip
 
 
 def _precision_entry(precision: Precision) -> PrecisionEntry:

@@ -153,24 +153,19 @@ def fit_payload(fitted: Fitted) -> FittedModels:
 
 def sweeps_payload(sweeps: Sweeps) -> SweepsEntry:
     """Return what a continuous test was split into, in degrees, kPa and N."""
-    return {
-        "swept": sweeps.swept,
-        "axes": sweeps.table.axes,
-        "samples": sweeps.samples,
-        "samples_left_out": sweeps.left_out,
-        "rows": len(sweeps.table["SA"]),
-        "conditions": [
-            {
-                "inclination_deg": None if s.inclination_rad is None else math.degrees(s.inclination_rad),
-                "pressure_kPa": None if s.pressure_Pa is None else s.pressure_Pa / 1e3,
-                "load_N": s.load_N,
-                "speed_km_h": None if s.speed_m_s is None else s.speed_m_s * 3.6,
-                "direction": s.direction,
-                "samples": s.samples,
-            }
-            for s in sweeps.sweeps
-        ],
-    }
+    conditions = [
+        entry_of(
+            SweepCondition, sweep,
+            inclination_deg=None if sweep.inclination_rad is None else math.degrees(sweep.inclination_rad),
+            pressure_kPa=None if sweep.pressure_Pa is None else sweep.pressure_Pa / 1e3,
+            speed_km_h=None if sweep.speed_m_s is None else sweep.speed_m_s * 3.6,
+        )
+        for sweep in sweeps.sweeps
+    ]  # fmt: skip
+    return entry_of(
+        SweepsEntry, sweeps, axes=sweeps.table.axes, samples_left_out=sweeps.left_out,
+        rows=len(sweeps.table["SA"]), conditions=conditions,
+    )  # fmt: skip
 
 
 def sweeps_text(sweeps: Sweeps) -> str:

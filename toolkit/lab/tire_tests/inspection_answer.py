@@ -154,40 +154,27 @@ def intervals_of(inspection: Inspection) -> tuple[Interval, ...]:
 def inspection_payload(inspection: Inspection, intervals: tuple[Interval, ...]) -> Inspected:
     """Return what a recording holds as the JSON answer."""
     recording, context = inspection.recording, inspection.context
-    return {
-        "file": recording.path,
-        "sha256": recording.sha256,
-        "format": recording.format,
-        "machine": recording.machine.name,
-        "machine_source": context.machine_source,
-        "simulated": recording.simulated,
-        "date": context.date.isoformat() if context.date else None,
-        "rows": recording.rows,
-        "channels": [entry_of(SeriesEntry, series) for series in recording.series],
-        "blocks": [_block(block) for block in inspection.blocks],
-        "slip_angle_deg": math.degrees(inspection.slip_angle_rad),
-        "calibration": _calibration(inspection),
-        "corrected_by": inspection.corrected_by,
-        "unverified": inspection.unverified,
-        "corrected_tared": False,
-        "corrected": [_values(block) for block in inspection.blocks],
-        "corrected_first_row": _values(inspection.first_row),
-        "intervals": [entry_of(CoefficientInterval, interval) for interval in intervals],
-        "refused_records": inspection.choice.refused if inspection.choice else (),
-        "findings": [finding.as_dict() for finding in inspection.findings],
-    }
+    return entry_of(
+        Inspected, inspection, context, recording,
+        file=recording.path,
+        machine=recording.machine.name,
+        channels=[entry_of(SeriesEntry, series) for series in recording.series],
+        blocks=[_block(block) for block in inspection.blocks],
+        slip_angle_deg=math.degrees(inspection.slip_angle_rad),
+        calibration=_calibration(inspection),
+        corrected_tared=False,
+        corrected=[_values(block) for block in inspection.blocks],
+        corrected_first_row=_values(inspection.first_row),
+        intervals=[entry_of(CoefficientInterval, interval) for interval in intervals],
+        refused_records=inspection.choice.refused if inspection.choice else (),
+    )  # fmt: skip
 
 
 def _block(block: LoadBlock) -> Block:
-    return {
-        "first_row": block.first_row,
-        "last_row": block.last_row,
-        "rows": block.last_row - block.first_row + 1,
-        "tare": block.tare,
-        "load_N": block.FZ_N,
-        "load_lbf": _lbf(block.FZ_N),
-        "slip_angle_deg": math.degrees(block.SA_rad),
-    }
+    return entry_of(
+        Block, block, rows=block.last_row - block.first_row + 1, load_N=block.FZ_N,
+        load_lbf=_lbf(block.FZ_N), slip_angle_deg=math.degrees(block.SA_rad),
+    )  # fmt: skip
 
 
 def _values(block: LoadBlock) -> BlockValues:

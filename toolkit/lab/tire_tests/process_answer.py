@@ -18,7 +18,6 @@ from toolkit.lab.answers import (
     EstimateEntry,
     Timing,
     draft_keys,
-    estimate_keys,
     finding_lines,
     mark_words,
     one_line,
@@ -153,27 +152,16 @@ def process_payload(resolved: Resolved) -> ReducedTest:
 
     reduced, characteristics = resolved.result.reduced, resolved.result.characteristics
     points = {(p.file, p.first_row): p for p in characteristics.points}
-    return {
-        "test": reduced.info.name,
-        "machine": reduced.info.machine,
-        "simulated": reduced.info.simulated,
-        "axes": reduced.axes,
-        "averaging": reduced.averaging,
-        "protocol": reduced.protocol,
-        "reversal": reduced.info.reversal,
-        "calibration": reduced.calibration.as_dict(),
-        **draft_keys(reduced.calibration),
-        "tare": entry_of(Tare, reduced.tare),
-        "stated": [
-            entry_of(
-                StatedComponent,
-                component,
-                unit=CHANNELS[component.symbol].si if component.symbol in CHANNELS else "1",
-            )
-            for component in reduced.stated
+    return entry_of(
+        ReducedTest, resolved, reduced, reduced.info,
+        test=reduced.info.name,
+        machine=reduced.info.machine,
+        stated=[
+            entry_of(StatedComponent, c, unit=CHANNELS[c.symbol].si if c.symbol in CHANNELS else "1")
+            for c in reduced.stated
         ],
-        "conditions": [_condition(c, points.get((c.file, c.first_row))) for c in reduced.conditions],
-        "characteristics": {
+        conditions=[_condition(c, points.get((c.file, c.first_row))) for c in reduced.conditions],
+        characteristics={
             **{
                 name: [_entry(entry) for entry in entries]
                 for name, entries in answer_lists(characteristics.rows).items()
@@ -190,22 +178,17 @@ def process_payload(resolved: Resolved) -> ReducedTest:
                 if row.estimate is not None and row.SA_rad is None
             ],
         },
-        "sweeps": [_swept(sweep) for sweep in characteristics.sweeps],
-        "impossible": [finding.as_dict() for finding in reduced.impossible],
-        "findings": [finding.as_dict() for finding in resolved.findings],
-    }
+        sweeps=[_swept(sweep) for sweep in characteristics.sweeps],
+        **draft_keys(reduced.calibration),
+    )  # fmt: skip
 
 
 def _swept(sweep: SweepFit) -> SweptLoad:
-    from toolkit.estimate import Estimate
-
     apparent = Estimate(value=sweep.length_m, u=sweep.u_m, unit="m", dof=sweep.dof)
-    return {
-        "file": sweep.file, "rotation": sweep.rotation, "rows": [sweep.first_row, sweep.last_row],
-        "FZ_N": sweep.load_N, "speed_m_s": sweep.speed_m_s, "steer_rate_rad_s": sweep.steer_rate_rad_s,
-        "apparent_length": estimate_keys(apparent), "u_form_m": sweep.form_m,
-        "delay_s": sweep.delay_s, "u_delay_s": sweep.delay_u_s,
-    }  # fmt: skip
+    return entry_of(
+        SweptLoad, sweep, rows=[sweep.first_row, sweep.last_row], FZ_N=sweep.load_N,
+        apparent_length=apparent.as_dict(), u_form_m=sweep.form_m, u_delay_s=sweep.delay_u_s,
+    )  # fmt: skip
 
 
 def _condition(c: ReducedCondition, point: Point | None) -> Condition:
@@ -244,11 +227,7 @@ def _hub_value(entry: HubLoad) -> HubValue:
 
 
 def _entry(entry: dict[str, Any]) -> dict[str, Any]:
-    from toolkit.estimate import Estimate
-
-    return {
-        key: estimate_keys(value) if isinstance(value, Estimate) else value for key, value in entry.items()
-    }
+    return {key: value.as_dict() if isinstance(value, Estimate) else value for key, value in entry.items()}
 
 
 def process_text(resolved: Resolved, out: Path | None, style: Style) -> str:

@@ -250,7 +250,7 @@ def _equation(c: Certificate, load: LoadResult) -> Node:
     for term in load.terms:
         coefficient_unit = dsi_of_term(load.unit, term.term, units)
         u = f"{abs(term.standard_error * coefficient_unit.factor):.2g}"
-        comment = f"issued: {term.issued!r} {term.unit}; full: {term.full!r} {term.unit}"
+        comment = f"issued: {term.issued} {term.unit}; full: {term.full!r} {term.unit}"
         lines.append(
             quantity(
                 term.term,

@@ -78,7 +78,7 @@ def _load(
         unit=load.unit,
         terms=tuple(
             TermLine(term=t, full=c, issued=i, standard_error=u, unit=_term_unit(record, load, t))
-            for t, c, i, u in zip(load.terms, load.coefficients, load.issued, errors, strict=True)
+            for t, c, i, u in zip(load.terms, load.coefficients, load.issued_texts, errors, strict=True)
         ),
         method=load.method,
         n=loads.rows,

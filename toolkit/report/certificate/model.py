@@ -59,7 +59,7 @@ class TermLine:
 
     term: str
     full: float
-    issued: float
+    issued: str
     standard_error: float
     unit: str
 

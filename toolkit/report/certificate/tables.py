@@ -89,7 +89,7 @@ def coefficients(c: Certificate) -> Texts:
     for load in c.loads:
         for t in load.terms:
             error = round_uncertainty(t.standard_error)
-            yield load.load, t.term, repr(t.full), repr(t.issued), error, printed(t.unit)
+            yield load.load, t.term, repr(t.full), t.issued, error, printed(t.unit)
 
 
 @_table(

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 _PLAIN = 1e7
+_DECADES = 100.0  # from one end of an interval to the other: its half width rounds the value away
 
 
 def few(value: float, digits: int = 3) -> str:
@@ -30,6 +31,11 @@ def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, st
     >>> rounded(5463.5, (5120.0, 5800.0)), rounded(0.2, None)
     (('5460', '5120 to 5800'), ('0.2', ''))
 
+    Of a size that is known to a power of ten or two, each number has its own digits:
+
+    >>> rounded(0.368, (0.00012, 1100.0))
+    ('0.37', '0.00012 to 1100')
+
     A size that cannot be negative, of which the interval leaves nothing but that it is small, has no digits:
 
     >>> rounded(1.28e-17, (0.0, 3.1e-5)), rounded(2e-6, (0.0, 0.31))
@@ -38,6 +44,8 @@ def rounded(value: float, interval: tuple[float, float] | None) -> tuple[str, st
     if interval is None:
         return few(value, 4), ""
     low, high = interval
+    if low > 0 and high > _DECADES * low:
+        return few(value, 2), f"{few(low, 2)} to {few(high, 2)}"
     half = max(high - value, value - low)
     if not (math.isfinite(half) and half > 0):
         return few(value, 4), f"{few(low, 4)} to {few(high, 4)}"

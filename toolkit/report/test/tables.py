@@ -144,7 +144,7 @@ def fits(report: ReportedTest, style: Style) -> Rows:
     unit|unit of load and indication
     """,
 )
-def calibration(report: ReportedTest, _style: Style) -> Rows:
+def calibration(report: ReportedTest, style: Style) -> Rows:
     """Return the terms of every load."""
     record = report.record
     units = dict(zip(record.indications, record.indication_units, strict=True)) if record else {}
@@ -156,7 +156,7 @@ def calibration(report: ReportedTest, _style: Style) -> Rows:
                 load.load,
                 term,
                 load.coefficients[i],
-                load.issued[i] if i < len(load.issued) else None,
+                style.decimal(load.issued_texts[i]),
                 errors[i] if i < len(errors) else None,
                 printed(f"{load.unit} per {unit}" if unit else load.unit),
             )

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from toolkit.report.style import Style
-from toolkit.report.tags import DRAWN, format_problem, parse_tag
+from toolkit.report.tags import DRAWN, format_problem, parse_tag, width_emu
 from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.fonts import missing_fonts, undrawn
 from toolkit.report.word.lint import (
@@ -23,8 +24,9 @@ from toolkit.report.word.lint import (
     surroundings,
     unprinted,
 )
-from toolkit.report.word.look import must_be_read, unreadable
+from toolkit.report.word.look import LEAST_SIZE, must_be_read, unreadable
 from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.pictures import letters_of
 from toolkit.report.word.scan import (
     LITERAL,
     Site,
@@ -216,6 +218,16 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
     if family in DRAWN and site.story.root.tag in (q("w:footnotes"), q("w:endnotes")):
         # LibreOffice 7.4 loses every picture of a note when it reads a .docx.
         yield _at(site, "wrong-place", f"{tag}: a figure in a note would be missing from the PDF")
+    if family in DRAWN and not format_problem(family, tag.spec):
+        letters, smallest = letters_of(site.element, site.story, width_emu(tag.spec)), LEAST_SIZE / 2
+        if letters < smallest:
+            finding = _at(
+                site, "figure-small",
+                f"{tag}: the letters of the figure would be {letters:.2g} pt high where it stands; nobody "
+                f"reads letters below {smallest:g} pt",
+            )  # fmt: skip
+            # Somewhat larger it is a small picture of its curves, which an organisation may want.
+            yield finding if letters < _SEEN_PT else replace(finding, level="warning")
     if site.form == "control":
         content = site.element.find(SDT_CONTENT)
         if content is None:
@@ -364,6 +376,9 @@ def _broken(parts: list[Story], words: Vocabulary) -> Iterator[LintFinding]:
                 message = f"tk:{path} would be printed as it stands: write {{{{tk:{path}}}}}"
                 yield at_element("malformed-tag", story, element, message, "error")
 
+
+_SEEN_PT = 1.0
+"""Of the letters of a figure: below, no more than a spot is printed."""
 
 __all__ = ["RULES", "LintFinding", "check_stories", "check_template"]
 

@@ -42,6 +42,7 @@ RULES = {
     "unprinted-required": "a required tag stands only where a report may not print it",
     "not-as-chart": "a figure cannot be a chart of Word's own",
     "doubled-tag": "a figure or table stands twice in the body",
+    "figure-small": "a figure is so narrow where it stands that its letters cannot be read",
     "bad-format": "the format after the bar does not fit the tag",
     "wrong-place": "a tag stands where it cannot be filled",
     "overlapping-tags": "a tag stands inside a control that will be filled as a whole",

@@ -21,7 +21,7 @@ from toolkit.report.word.lint import LintFinding
 from toolkit.report.word.scan import LITERAL, Site, visible_texts
 from toolkit.report.word.xml import W_P, W_R, W_TC, Element, ancestor, parser, q
 
-_LEAST_SIZE = 7  # half-points
+LEAST_SIZE = 7  # half-points
 _LEAST_SCALE = 30  # percent
 _LEAST_LINE = 80  # twips, of a line of exact height
 _CONTRAST = 1.5
@@ -80,7 +80,7 @@ class _Looks:
             if (hidden := self._first(name, properties)) is not None and _on(hidden):
                 return f"its text is hidden ({name})"
         size = self._number("w:sz", properties, _DEFAULT_SIZE)
-        if size < _LEAST_SIZE:
+        if size < LEAST_SIZE:
             return f"its letters are {size / 2:g} pt high"
         if (scale := self._number("w:w", properties, 100)) < _LEAST_SCALE:
             return f"its letters are {scale:g} % wide"

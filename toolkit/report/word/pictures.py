@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from lxml import etree
 
 from toolkit.report.content import Plot
-from toolkit.report.figures import SIZE_IN, Picture
+from toolkit.report.figures import LETTERS_PT, SIZE_IN, Picture
 from toolkit.report.word.chart import (
     BOOK_RELATION,
     BOOK_TYPE,
@@ -109,6 +109,13 @@ def chart_run(
         tag=f"tk:chart.{plot.name}", alt=plot.alt, width_emu=cx, height_emu=cy, texts=chart_texts(plot)
     )
     return run, xml, shown
+
+
+def letters_of(at: Element, story: Story, width: int | None) -> float:
+    """Return how large the numbers at a figure's axes are [pt] where it stands as wide as asked."""
+    width_in, height_in = SIZE_IN
+    cx, _ = _size(at, story, width, height_in / width_in)
+    return LETTERS_PT * cx / (width_in * EMU_INCH)
 
 
 def _size(at: Element, story: Story, width: int | None, slope: float) -> tuple[int, int]:

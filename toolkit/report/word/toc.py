@@ -260,7 +260,7 @@ def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleShe
     ]
     if not paragraphs:
         paragraphs = [etree.Element(W_P)]
-    head = [*before, _mark("begin"), _code(field.code), _mark("separate")]
+    head = [*before, _mark("begin"), _text(field.code, _INSTR), _mark("separate")]
     at = 1 if paragraphs[0].find(_P_PR) is not None else 0
     for offset, run in enumerate(head):
         paragraphs[0].insert(at + offset, run)
@@ -331,7 +331,7 @@ def _line(
         holder.extend(
             [
                 _mark("begin"),
-                _code(f" PAGEREF {entry.bookmark} \\h "),
+                _text(f" PAGEREF {entry.bookmark} \\h ", _INSTR),
                 _mark("separate"),
                 _text("1"),
                 _mark("end"),
@@ -363,19 +363,11 @@ def _mark(kind: str) -> Element:
     return run
 
 
-def _code(text: str) -> Element:
+def _text(text: str, kind: str = W_T) -> Element:
     run = etree.Element(W_R)
-    code = etree.SubElement(run, _INSTR)
-    code.text = text
-    code.set(XML_SPACE, "preserve")
-    return run
-
-
-def _text(text: str) -> Element:
-    run = etree.Element(W_R)
-    t = etree.SubElement(run, W_T)
-    t.text = text
-    t.set(XML_SPACE, "preserve")
+    content = etree.SubElement(run, kind)
+    content.text = text
+    content.set(XML_SPACE, "preserve")
     return run
 
 
