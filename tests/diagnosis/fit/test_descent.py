@@ -38,9 +38,10 @@ DECAY, LINE = 'p["a"] * np.exp(-p["k"] * t)', 'p["a"] + p["k"] * t'
 T = np.linspace(0.0, 4.0, 200)
 
 
-def fitted(folder, formula, values, **start):
+def fitted(folder, formula, values, *, sd="1e3", **start):
     table = pd.DataFrame({"t": T, "F": values})
-    path = write_case(folder, CASE.format(**start), simulator=SIMULATOR % formula, r0__csv=table)
+    text = CASE.replace("1e3", sd).format(**start)
+    path = write_case(folder, text, simulator=SIMULATOR % formula, r0__csv=table)
     case = read_case(path)
     problem = problem_of(case, model_of(case, None))
     asked, simulate = set(), problem.model.simulate
@@ -69,6 +70,14 @@ def test_a_straight_problem_needs_differences_once_on_the_way_and_once_at_the_en
     np.testing.assert_allclose(made.p, np.polynomial.polynomial.polyfit(T, values, 1), rtol=1e-6)
     # two differences at the start and two at the solution; start, solution, and what rounding moves it by
     assert asked <= 10
+
+
+def test_a_fit_ends_where_no_step_promises_anything_and_simulates_nothing_to_see_that(tmp_path):
+    """Against a prior that is too narrow, by data of little noise: a way of many bends along both."""
+    values = 10 * np.exp(-1.1 * T) + np.random.default_rng(4).normal(0, 0.01, T.size)
+    made, asked = fitted(tmp_path, DECAY, values, a=9.0, k=0.6, sd="0.1")
+    assert made.p == pytest.approx((9.17, 0.986), rel=0.003)
+    assert asked <= 26  # a search that saw it by simulations took 38
 
 
 def test_a_trial_that_runs_away_is_large_and_no_fault_of_arithmetic(tmp_path):

@@ -4,7 +4,11 @@ A simulation is dear, and derivatives by differences take one for each parameter
 where the simulation has left the straight line: on the way they are corrected by what each trial shows
 (Broyden). An answer never rests on derivatives that are off by more than a few percent along the way to it.
 
-Source: Broyden, Math. Comp. 19 (1965) 577.
+A step is that of linear least squares within the bounds, damped where it leads beyond a radius in which the
+last one held. Where the whole linear problem promises nothing, the search is at its end.
+
+Sources: Broyden, Math. Comp. 19 (1965) 577; Stark and Parker, Comput. Stat. 10 (1995) 129, least squares
+within bounds; Levenberg, Quart. Appl. Math. 2 (1944) 164, damping.
 
 The vector is that of a joint fit (`Space`): free parameters, then the effects' values, each over its size.
 """

@@ -98,7 +98,7 @@ def _correlated(columns: Array, where: Layout, noise: Autoregression) -> Array:
     return products
 
 
-_OUTER = 4  # times that the noise is estimated anew
+_OUTER = 5  # times that the noise is estimated anew, the first roughly
 _BETTER = 0.02  # of the log-likelihood: less is no step worth another round
 _MARGIN = 0.5  # of what tells that noise has absorbed physics: nearer to it than that, both are fitted
 _ROUGH = 1e-3  # of the squares: a first round that leads no farther is good enough to see the noise
@@ -165,7 +165,11 @@ def fit(
     space = derivatives.space
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
-    solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives, least)
+    if plain and noise and any(each.reflection for each in noise.values()):  # what rows are worth is known
+        begun = space.simulated(x)
+        solved = _Solved(x, begun, space.residual(begun), noise, -math.inf)
+    else:
+        solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives, least)
     alternative = None
     if solved.score < least:  # ordinary least squares are no likelier: the plain solution cannot reach it
         plain, intervals = False, False
@@ -449,14 +453,9 @@ def _score(
 
 
 def _covariance(
-    space: Space,
-    solved: _Solved,
-    alternative: _Solved | None,
-    layouts: dict[str, Layout],
-    derivatives: Derivatives,
-    *,
-    plain: bool,
-) -> Array:
+    space: Space, solved: _Solved, alternative: _Solved | None, layouts: dict[str, Layout],
+    derivatives: Derivatives, *, plain: bool,
+) -> Array:  # fmt: skip
     """Return the covariance of a solution, with what the plain ``other`` disagrees with it beside.
 
     Under the right model the two differ as far as the plain one is the less sure. A parameter by which they
@@ -493,6 +492,6 @@ def _covariance(
     added = disagreeing(alternative)
     if (
         added.any() and alternative.score == -math.inf
-    ):  # the straight way alone: the bent one tells by how much
+    ):  # by the straight way alone: the bent one tells how much
         added = disagreeing(_plain(space, layouts, solved, derivatives) or alternative)
     return matrix + np.diag(added)

@@ -14,7 +14,8 @@ _WIDTH = 1e-3  # of the state's spread, over which the rate falls to nothing
 
 
 def _stopped(state: Any, spread: float, values: Values) -> Any:
-    return np.clip((values["level"] - state) / (_WIDTH * spread), 0.0, 1.0)
+    # In place of `clip`, which takes ten times as long of the one number that a step asks for.
+    return np.minimum(np.maximum((values["level"] - state) / (_WIDTH * spread), 0.0), 1.0)
 
 
 def _highest(case: Surroundings) -> float:
