@@ -31,15 +31,19 @@ def jobs(request: Request) -> Response:
     return page(request, "jobs", jobs=works, archives=archives_of(bench.home))
 
 
-def job(request: Request, template: str = "job") -> Response:
+def job(request: Request) -> Response:
     """Return a job's page."""
-    bench, work = _requested(request)
-    return page(request, template, seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
+    return _shown(request, "job")
 
 
 def state(request: Request) -> Response:
     """Return a job as it stands now: its page asks for this while it runs."""
-    return job(request, "part_job")
+    return _shown(request, "part_job")
+
+
+def _shown(request: Request, template: str) -> Response:
+    bench, work = _requested(request)
+    return page(request, template, seen=work, result=_result(bench, work), log=log_of(bench.home, work.id))
 
 
 def cancel(request: Request) -> Response:

@@ -45,4 +45,8 @@ def test_the_rate_of_a_recorded_angle_is_no_signal_of_a_law(tmp_path, angle, fac
         table.to_csv(tmp_path / f"r{number}.csv", index=False)
     case = read_case(tmp_path / "case.toml")
     problem = problem_of(case, model_of(case, None))
-    assert {signal.name for signal in signals_of(problem, fit(problem), "w")} == read
+    signals = {signal.name: signal for signal in signals_of(problem, fit(problem), "w")}
+    assert set(signals) == read
+    # A lag's difference is a rate: what the angle was before is no signal either.
+    assert signals["q"].remembered is ("dq/dt" in read)
+    assert signals["U"].remembered

@@ -65,6 +65,7 @@ class Signal:
 
     ``steady`` signals are recorded or simulated values themselves, no rates: of these two make a product.
     One with an ``origin`` is on a scale whose zero is one of convention: laws about zero count it from there.
+    Of one that is ``remembered`` laws may have a memory; it is not one whose rate is the output itself.
     """
 
     written: str
@@ -73,6 +74,7 @@ class Signal:
     values: Array = field(compare=False)
     steady: bool = True
     origin: float | None = None
+    remembered: bool = True
 
     def written_in(self, shape: Shape) -> str:
         """Return how a law of a shape writes it."""
@@ -231,7 +233,13 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
     if timed:
         times = np.concatenate([run.t for run in problem.runs])
         listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))
-    return tuple(each for each in listed if each.steady or not _is_record_of(problem, output, each))
+    records = [each for each in listed if not each.steady and _is_record_of(problem, output, each)]
+    of_records = {name for each in records for name in formula(each.written).signals}
+    return tuple(
+        replace(each, remembered=not of_records.intersection(formula(each.written).signals))
+        for each in listed
+        if each not in records
+    )
 
 
 def _is_record_of(problem: Problem, output: str, signal: Signal) -> bool:
@@ -277,7 +285,8 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
                 yield from started(problem, shape, (signal,), "adds", output)
                 if ITSELF not in signal.written and multiplies:
                     yield from started(problem, shape, (signal,), "multiplies", output)
-            for shape in REMEMBERING if problem.case.has_time and signal.name != "time" else ():
+            timed = problem.case.has_time and signal.name != "time" and signal.remembered
+            for shape in REMEMBERING if timed else ():
                 yield from started(problem, shape, (signal,), "adds", output)
         steady = [signal for signal in signals if signal.steady]
         for pair in itertools.combinations(steady, 2):
@@ -289,7 +298,8 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
             yield trial_at(problem, TONE, signals[-1:], "adds", output, {"frequency": line.frequency})
             yield from _locked(problem, base, output, line, signals[-1])
         if line is not None:
-            for signal, start in itertools.product(signals[:-1], rung(line.frequency)):
+            followed = [signal for signal in signals[:-1] if signal.remembered]
+            for signal, start in itertools.product(followed, rung(line.frequency)):
                 yield trial_at(problem, MODE, (signal,), "adds", output, start)
         yield from _events(problem, base, output)
 

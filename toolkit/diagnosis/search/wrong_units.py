@@ -33,7 +33,7 @@ from toolkit.diagnosis.search.unseen_runs import gains_of, takes_most
 from toolkit.diagnosis.simulators.parameter_units import channel_unit
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects
-from toolkit.effects.unit_ratios import unit_ratios
+from toolkit.effects.unit_ratios import near_ratio, unit_ratios
 from toolkit.errors import FitError, UnitError
 
 if TYPE_CHECKING:
@@ -165,8 +165,10 @@ def unit_step(
     gains = gains_of(problem, held_base, shown)
     least = max(gains) - VERDICT.close
 
-    def order(i: int) -> tuple[bool, bool, float]:
-        return gains[i] <= least, not shown[i][0].active[-1].effect.discrete, -gains[i]
+    def order(i: int) -> tuple[bool, bool, bool, float]:
+        applied = shown[i][0].active[-1]
+        of_units = _is_of_units(problem, applied)
+        return gains[i] <= least, not applied.effect.discrete, not of_units, -gains[i]
 
     best = min(range(len(shown)), key=order)
     made, held_out = shown[best]
@@ -183,6 +185,15 @@ def unit_step(
         ),
     )
     return made, held_out, step
+
+
+def _is_of_units(problem: Problem, applied: AppliedEffect) -> bool:
+    """Tell whether a ratio is one of two units: a likelier mistake than a power of ten that is none."""
+    if not applied.effect.discrete or not applied.effect.names:
+        return False
+    ratio = applied.values[applied.effect.names[0]]
+    name = near_ratio(ratio, ratio, channel_unit(problem.case, problem.model, str(applied.channel)))
+    return name is not None and " read as " in name
 
 
 def _is_gross(problem: Problem, name: str, residual: Array) -> bool:
