@@ -60,6 +60,7 @@ def test_both_equations_have_it_with_the_size_that_each_body_gives_it(tmp_path, 
     assert [law["place"] for law in laws] == [{"kind": "state", "channel": name} for name in ("x1", "x2")]
     for law, size in zip(laws, (-EXCHANGE / 400, EXCHANGE / 250), strict=True):
         assert (law["form"], law["formula"], law["variables"]) == ("static", "a*(x1 - x2)", ["x1", "x2"])
+        assert all(20 <= low < 40 < high for low, high in law["range"].values())
         value, low, high = estimates(law)["a"]
         assert low < size < high
         assert value == pytest.approx(size, rel=0.05)

@@ -61,13 +61,13 @@ def exchanges_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterator
     motion = problem.model.capability.motion
     if motion is None or not motion.integrates:
         return
-    states = {state.name for state in motion.states}
+    states = {state.name: np.array(state.quantiles) for state in motion.states}
     for pair in itertools.combinations([name for name in entered(problem, motion) if name in states], 2):
         units = {reduced(motion.units(name)[1]) for name in pair}
         if len(units) > 1:
             continue
         of_both = {
-            name: Signal(written=f"[{name}]", name=name, unit=next(iter(units)), values=np.zeros(1))
+            name: Signal(written=f"[{name}]", name=name, unit=next(iter(units)), values=states[name])
             for name in pair
         }
         for shape in ALIKE:
