@@ -23,7 +23,7 @@ def cut_number(text: str, separator: str) -> str | None:
     r"""Return the number within which a table's text ends; None where it ends with a line or a whole number.
 
     >>> rows = "".join(f"{row},0.{row}25\n" for row in range(10, 30))
-    >>> cut_number("x,y\n" + rows + "30,0.3", ","), cut_number("x,y\n" + rows + "30,0.302", ",")
+    >>> cut_number("x,y\n" + rows + "30,0.3", ","), cut_number("x,y\n" + rows + "30,0.3025", ",")
     ('0.3', None)
     """
     if text.endswith(("\n", "\r")):
