@@ -101,3 +101,11 @@ def test_what_is_no_formula_of_a_law_is_refused(text):
     with pytest.raises(ConfigError) as caught:
         formula(text)({"x": 1.0}, {"a": 1.0})
     assert caught.value.rule == "law-formula"
+
+
+@pytest.mark.parametrize("frequency", [0.0, 1e-9, 1e-5])
+def test_a_vibration_without_end_stands_still(frequency):
+    t = np.arange(400) * 0.05
+    x = np.sin(t) + 3.0
+    moved = formula("mode([x], frequency, damping)")({"x": x}, {"frequency": frequency, "damping": 0.3}, t)
+    np.testing.assert_allclose(moved, 3.0, atol=0.02)  # as it stood at the first row

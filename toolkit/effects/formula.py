@@ -87,6 +87,8 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
 
     if len(t) < 3:
         return x
+    # One that takes a thousand times as long as the rows last stands still in them.
+    frequency = max(frequency, 1e-3 / float(t[-1] - t[0]))
     # Fine enough for the vibration as for the rows.
     step = min(float(np.median(np.diff(t))), 0.1 / frequency)
     even = np.arange(t[0], t[-1] + step, step)

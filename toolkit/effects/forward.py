@@ -120,9 +120,19 @@ def _counted(values: Array, origin: float | None) -> Array:
 
 
 def _acted(hook: ChannelHook, y: Array, values: Values, setting: Setting) -> Array:
-    """Return what a hook makes of a channel, about the origin of its scale where it has one by convention."""
-    origin = values.get(ORIGIN)
-    return hook(y, values, setting) if origin is None else hook(y - origin, values, setting) + origin
+    """Return what a hook makes of a channel, about the origin of its scale where it has one by convention.
+
+    Raises FitError where it makes nothing of it: a period of no length, at the end of what it may be.
+    """
+    origin = values.get(ORIGIN, 0.0)
+    try:
+        return hook(y - origin, values, setting) + origin if origin else hook(y, values, setting)
+    except ArithmeticError as error:
+        raise FitError(
+            "an effect has no value", where=", ".join(f"{name} {values[name]:.4g}" for name in values),
+            got=str(error), expected="values with which it can be computed",
+            next_step="none is needed: the search goes on without them", rule="simulator",
+        ) from error  # fmt: skip
 
 
 def with_source(setting: Setting, values: Array) -> Setting:

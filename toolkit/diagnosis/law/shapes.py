@@ -184,8 +184,12 @@ UNLOCKED = Shape(    form="tone", units={"a": "{y}", "frequency": "Hz", "phase":
 
 
 def curve(x: Array) -> Shape:
-    """Return the curve of a signal without a formula: a natural spline through knots at its quantiles."""
-    knots = np.unique(np.quantile(x, np.linspace(0.01, 0.99, LAWS.knots)))
-    points = ", ".join(f"{knot:.6g}, a{i}" for i, knot in enumerate(knots, start=1))
+    """Return the curve of a signal without a formula: a natural spline through knots at its quantiles.
+
+    Knots that are one as they are written are one: of a signal that hardly moves there are few.
+    """
+    quantiles = np.quantile(x, np.linspace(0.01, 0.99, LAWS.knots))
+    knots = list(dict.fromkeys(f"{knot:.6g}" for knot in quantiles.tolist()))
+    points = ", ".join(f"{knot}, a{i}" for i, knot in enumerate(knots, start=1))
     units = {f"a{i}": "{y}" for i in range(1, len(knots) + 1)}
     return Shape(form="static", text=f"spline({{x}}, {points})", units=units, about_zero=False)
