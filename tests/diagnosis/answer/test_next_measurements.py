@@ -214,11 +214,13 @@ def test_a_zero_that_every_run_has_to_one_side_is_to_be_read(zeros, told):
         [zero + part - part.mean() for zero, part in zip(zeros, np.split(wave, runs), strict=True)]
     )
     problem = Of(
-        model=Of(outputs=(Of(name="T", unit="N*m"),)), kept={"T": np.ones(100 * runs, bool)},
+        rates={}, model=Of(outputs=(Of(name="T", unit="N*m"),)), kept={"T": np.ones(100 * runs, bool)},
         slices=tuple(slice(100 * k, 100 * k + 100) for k in range(runs)),
     )  # fmt: skip
     said = zeros_to_read(Of(problem=problem, augmented=Of(residual={"T": residual})))
     assert [text.split(" and after")[0] for text in said] == told
+    problem.rates = {"T": 1}  # it drifts: where it is says nothing of a zero
+    assert zeros_to_read(Of(problem=problem, augmented=Of(residual={"T": residual}))) == []
 
 
 def test_the_advice_beside_a_name_is_about_what_it_leaves():

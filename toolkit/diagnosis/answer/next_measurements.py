@@ -137,10 +137,11 @@ def next_measurements(
 def zeros_to_read(search: Search) -> list[str]:
     """Return that a zero is to be read, where most of a rest is one that every run has to the same side.
 
-    Of a few runs that is no proof of a zero that they share, and yet the first that a laboratory looks at.
+    Of a few runs that is no proof of a zero that they share, and yet the first that a laboratory looks at. An
+    output that only drifts has no zero of its own to read.
     """
     problem, sentences = search.problem, []
-    for output in problem.model.outputs:
+    for output in (each for each in problem.model.outputs if each.name not in problem.rates):
         kept, residual = problem.kept[output.name], search.augmented.residual[output.name]
         runs = [residual[rows][kept[rows]] for rows in problem.slices if kept[rows].any()]
         means = sorted((float(np.mean(run)) for run in runs), key=abs)
