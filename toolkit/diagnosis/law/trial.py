@@ -46,7 +46,7 @@ from toolkit.diagnosis.search.unexplained import (
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, reduced
 from toolkit.diagnosis.simulators.setting import is_speed
 from toolkit.effects.applied import AppliedEffect
-from toolkit.effects.formula import formula
+from toolkit.effects.formula import formula, way
 from toolkit.effects.law import ITSELF, SCALED, TIME, Acts, conversion, law_effect, law_name
 from toolkit.errors import FitError
 from toolkit.units import unit
@@ -259,17 +259,13 @@ def _is_record_of(problem: Problem, output: str, signal: Signal) -> bool:
 
 def _way(problem: Problem, name: str, text: str, speed: Array) -> Signal:
     """Return the way of a recorded speed from the first row of each run on."""
-    written = f"way([{name}])"
-    law = formula(written)
-    candidates = [
-        law({name: speed[rows]}, {}, run.t) for run, rows in zip(problem.runs, problem.slices, strict=True)
-    ]
-    unit_of_way = reduced(f"{bracketed(text)}*s")
     return Signal(
-        written=written,
+        written=f"way([{name}])",
         name=f"way of {name}",
-        unit=unit_of_way,
-        values=np.concatenate(candidates),
+        unit=reduced(f"{bracketed(text)}*s"),
+        values=np.concatenate(
+            [way(run.t, speed[rows]) for run, rows in zip(problem.runs, problem.slices, strict=True)]
+        ),
         steady=False,
     )
 
