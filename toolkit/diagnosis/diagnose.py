@@ -14,7 +14,7 @@ from toolkit.diagnosis.answer.answer import Diagnosis
 from toolkit.diagnosis.answer.build_answer import answer_of
 from toolkit.diagnosis.answer.case_findings import calibration_findings, case_findings
 from toolkit.diagnosis.answer.failed_runs import FailedRuns
-from toolkit.diagnosis.answer.naming import mostly_unknown
+from toolkit.diagnosis.answer.naming import kept_beside_laws, mostly_unknown
 from toolkit.diagnosis.answer.truncated_answer import STEPS, does_not_vary, without_search
 from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.fit.averages import (
@@ -145,6 +145,9 @@ def _diagnosed(
                 outcome = search(posed.problem, seed=seed, budget=budget)
                 outcome = before_nothing(outcome, seed=seed, budget=budget)
                 laws = learned(outcome, withdrawn=mostly_unknown(outcome), budget=budget)
+                outcome = kept_beside_laws(outcome, laws)
+                if outcome.kept:
+                    laws = learned(outcome, withdrawn=False, budget=budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
                 outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
                 outcome = without_untested(outcome, laws)

@@ -35,7 +35,7 @@ from toolkit.diagnosis.case.case import Case
 from toolkit.diagnosis.policy import LOCATION, PRIORS, SCREENING, UNITS, VERDICT
 from toolkit.diagnosis.search.channel_factors import factor_of, is_ratio
 from toolkit.diagnosis.search.forward_step import Step
-from toolkit.diagnosis.search.noise_floor import LARGE, LONG
+from toolkit.diagnosis.search.noise_floor import LARGE, LONG, SMOOTH
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.search.unexplained import narrowest_line
 from toolkit.diagnosis.simulators.parameter_units import channel_unit, unit_of
@@ -110,7 +110,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
     )
 
 
-_UNTESTED = (LARGE, LONG)
+_UNTESTED = (LARGE, LONG, SMOOTH)
 """What is said of a rest that no test tells from noise: it has a reason, and no chance."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from toolkit.diagnosis.answer.held_out_errors import held_out_errors
 from toolkit.diagnosis.answer.next_measurements import implausible
 from toolkit.diagnosis.fit.sensor_noise import spread
 from toolkit.diagnosis.fit.structure import RUNS
+from toolkit.diagnosis.law.rivals import parameters_of, take_as_much
 from toolkit.diagnosis.policy import SCREENING, VERDICT
 from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.search import Search
@@ -20,33 +22,58 @@ from toolkit.diagnosis.search.superfluous import takes_nearly_all
 if TYPE_CHECKING:
     from toolkit.arrays import Array
     from toolkit.diagnosis.fit.problem import Problem
+    from toolkit.diagnosis.law.learn import Laws
+
+
+def kept_beside_laws(search: Search, laws: Laws) -> Search:
+    """Return a search whose effects are named although more stays: laws in their place take no more of it.
+
+    They were withdrawn for the rest, which something else was to explain with them. Where the best law of all
+    takes no more than they do, with no fewer parameters, it is their own formula or imitates them.
+    """
+    if not search.steps or imitates(search) or not outweighed(search) or not laws.complete:
+        return search
+    predicting = any(law.predicts for law in laws.listed)
+    if not predicting or parameters_of(laws.fit) < parameters_of(search.augmented):
+        return search
+    if not take_as_much(search.problem, search.held_refitted, search.held_augmented, laws.held_out):
+        return search
+    return replace(search, kept=True)
 
 
 def mostly_unknown(search: Search) -> bool:
-    """Tell whether what stays after the named effects outweighs them: they then only imitate it.
+    """Tell whether what stays after the named effects outweighs them: they then only imitate it."""
+    return imitates(search) or (not search.kept and outweighed(search))
 
-    By the log-likelihood, by what they take of the held-out mean square that is above the noise, and by the
-    parameters of the simulation: effects beside which one of these is what nobody believes it to be are not
-    what was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with
-    a size that no cell has.
 
-    Nothing outweighs effects that take more of an output's unseen rows than they leave there. Nor is anything
-    withdrawn for a rest of which a search that was cut short has not seen what it is.
+def imitates(search: Search) -> bool:
+    """Tell whether effects have sizes, or leave parameters, that nobody believes, or take hardly anything.
+
+    Effects beside which the parameters of the simulation are what nobody believes them to be are not what
+    was left out, unless they take nearly all of it. Nor is a cell's law beside an unexplained rest, with a
+    size that no cell has.
     """
-    if search.steps and implausible(search) and not _takes_nearly_all(search):
+    if not search.steps:
+        return False
+    if implausible(search) and not _takes_nearly_all(search):
         return True
-    shown = _taken(search)
-    if search.steps and not shown and _is_smooth(search):
+    if (not _taken(search) and _is_smooth(search)) or _is_within_accuracy(search):
         return True
-    if search.steps and _is_within_accuracy(search):
-        return True
+    # A rest that no test tells from anything (its gain is none) is no evidence that a size imitates it.
+    told = any(structure.gain > 0 for structure in search.structure) and not cut_short(search.skipped)
+    return told and any(is_outsized(search.problem, step.active) for step in search.steps)
+
+
+def outweighed(search: Search) -> bool:
+    """Tell whether what stays outweighs what effects explain.
+
+    By the log-likelihood, and by what they take of the held-out mean square that is above the noise. Nothing
+    outweighs effects that take more of an output's unseen rows than they leave there, nor a rest of which a
+    search that was cut short has not seen what it is.
+    """
     if not search.structure or (search.steps and cut_short(search.skipped)):
         return False
-    # A rest that no test tells from anything (its gain is none) is no evidence that a size imitates it.
-    if any(structure.gain > 0 for structure in search.structure) and any(
-        is_outsized(search.problem, step.active) for step in search.steps
-    ):
-        return True
+    shown = _taken(search)
     if any(removed > VERDICT.nearly * above for removed, above in shown) or _takes_more_than_is_left(search):
         return False
     unexplained = max(
@@ -68,8 +95,7 @@ def _is_smooth(search: Search) -> bool:
     """
     if all(step.active.effect.from_digits for step in search.steps):
         return False
-    n = sum(int(counted.sum()) for counted in search.problem.kept.values())
-    cost = 0.5 * math.log(n)  # of a parameter (BIC)
+    cost = 0.5 * math.log(max(search.problem.values, 1.0))  # of a parameter (BIC)
     named = sum(step.gain - cost * len(step.active.searched) for step in search.steps)
     nameless = (
         structure.gain / 2 - cost * structure.columns

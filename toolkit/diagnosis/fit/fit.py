@@ -165,7 +165,7 @@ def fit(
     space = derivatives.space
     layouts = {name: problem.layout(name, rows) for name in problem.names}
     x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
-    if plain and noise and any(each.reflection for each in noise.values()):  # what rows are worth is known
+    if plain and noise and any(each.is_coloured for each in noise.values()):  # what rows are worth is known
         begun = space.simulated(x)
         solved = _Solved(x, begun, space.residual(begun), noise, -math.inf)
     else:
@@ -271,7 +271,7 @@ def _plain_nearby(
 
 
 def _is_coloured(solved: _Solved) -> bool:
-    return len(solved.x) > 0 and any(each.reflection for each in solved.noise.values())
+    return len(solved.x) > 0 and any(each.is_coloured for each in solved.noise.values())
 
 
 def _worth(space: Space, from_: _Solved, drifting: dict[str, Differences]) -> dict[str, Autoregression]:
@@ -409,6 +409,7 @@ def noise_of(
             floor=problem.floor[name],
             sd=problem.sd_of(name),
             used=used // len(layouts),
+            memory=problem.memory.get(name),
         )
         for name in problem.names
     }

@@ -214,14 +214,14 @@ class UnseenRun:
 
     Attributes
     ----------
-    n : values
+    n : independent values
     constant : logarithm of the density of values without any residual, that of the noise's scale in it
     rest : sum of squares of the innovations
     inner : products of the whitened constant and simulated output with themselves, (2, 2)
     outer : their products with the innovations, (2,)
     """
 
-    n: int
+    n: float
     constant: float
     rest: float
     inner: Array
@@ -248,7 +248,7 @@ class UnseenRun:
                 left, constant = white - taken, constant - cost
         product = white.T @ left
         return UnseenRun(
-            n=where.n,
+            n=where.n / (noise.memory or 1.0),
             constant=constant,
             rest=float(product[0, 0]),
             inner=product[1:, 1:],

@@ -26,11 +26,19 @@ if TYPE_CHECKING:
 class Autoregression:
     """An autoregression: reflection coefficients, and the innovations' standard deviation.
 
-    ``reflection`` has one entry an order; white noise has none. ``sd`` is in the output's unit.
+    ``reflection`` has one entry an order; white noise has none. ``sd`` is in the output's unit. What a
+    simulation is off by is no noise, and its past foretells no row of it: it has a ``memory``, the rows to
+    one independent value, and is weighed by its size and their number alone.
     """
 
     reflection: tuple[float, ...]
     sd: float
+    memory: float | None = None
+
+    @property
+    def is_coloured(self) -> bool:
+        """Tell whether rows are weighed by what their past foretells of them."""
+        return bool(self.reflection) and self.memory is None
 
     @property
     def marginal_sd(self) -> float:
@@ -41,9 +49,20 @@ class Autoregression:
     @property
     def correlation_rows(self) -> float:
         """Rows to one independent value of the noise's mean: its spectrum at zero over its variance."""
+        if self.memory is not None:
+            return self.memory
         polynomial = predictor(self.reflection)[-1]
         at_zero = (self.sd / max(abs(1 - float(np.sum(polynomial))), 1e-6)) ** 2
         return max(1.0, at_zero / max(self.marginal_sd**2, 1e-300))
+
+
+def memory_of(noise: Autoregression, rows: int) -> float:
+    """Return the rows to one independent value of a noise's square, and of its mean, whichever are more.
+
+    A mean square of many rows scatters as one of so many fewer (Bartlett).
+    """
+    correlation = autocovariance(noise, max(rows, 2)) / noise.marginal_sd**2
+    return max(noise.correlation_rows, 2 * float(np.sum(correlation**2)) - 1)
 
 
 def predictor(reflection: Sequence[float]) -> list[Array]:
@@ -137,7 +156,13 @@ def layout(times: Sequence[Array], counted: Sequence[NDArray[np.bool_]], *, orde
 
 
 def fit_noise(
-    residual: Array, where: Layout, *, floor: float, sd: float | None = None, used: int = 0
+    residual: Array,
+    where: Layout,
+    *,
+    floor: float,
+    sd: float | None = None,
+    used: int = 0,
+    memory: float | None = None,
 ) -> Autoregression:
     """Return the noise of a residual: Burg's method over all segments, the order by BIC.
 
@@ -148,12 +173,13 @@ def fit_noise(
     sd : total sensor noise that a certificate states; the innovations are never taken as smaller than what
         it leaves
     used : parameters that were fitted to the residual
+    memory : rows to one independent value of a residual that is known to be no noise
     """
     n = where.n
     if n == 0:
         return Autoregression(reflection=(), sd=floor)
     variance = float(np.mean(residual**2))
-    if sd is not None and variance > (NOISE.mismatch * sd) ** 2:
+    if memory is None and sd is not None and variance > (NOISE.mismatch * sd) ** 2:
         # Most of it is none of the sensor's. Taken as coloured noise, a smooth mismatch foretells itself, and
         # what mends all but a jagged rest of it would look worse than nothing.
         return Autoregression(reflection=(), sd=math.sqrt(variance * n / max(n - used, 1)))
@@ -186,6 +212,10 @@ def fit_noise(
             if score < best_score - 1e-12:
                 best, best_score = order, score
     coefficients = tuple(reflection[:best])
+    if memory is not None:
+        keep = max(math.prod(1 - k * k for k in coefficients), 1e-12)
+        size = max(math.sqrt(variance * n / max(n - used, 1)), floor)
+        return Autoregression(reflection=coefficients, sd=size * math.sqrt(keep), memory=memory)
     white = whiten(residual, where, Autoregression(reflection=coefficients, sd=1.0))
     dof = max(n - used, 1)
     sd_of_innovations = math.sqrt(float(np.sum(white**2)) / dof)
@@ -217,6 +247,8 @@ def whiten(values: Array, where: Layout, noise: Autoregression) -> Array:
 
     Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
     """
+    if noise.memory is not None:
+        return values / (noise.marginal_sd * math.sqrt(noise.memory))
     orders = predictor(noise.reflection)
     p = len(noise.reflection)
     if p == 0:
@@ -270,6 +302,9 @@ def _early(noise: Autoregression) -> list[float]:
 def log_likelihood(residual: Array, where: Layout, noise: Autoregression) -> float:
     """Return the Gaussian log-likelihood of a residual under a noise (natural logarithm)."""
     white = whiten(residual, where, noise)
+    if noise.memory is not None:
+        constant = math.log(noise.marginal_sd) + 0.5 * math.log(2 * math.pi)
+        return float(-0.5 * np.sum(white**2) - where.n / noise.memory * constant)
     p = len(noise.reflection)
     shorter = 0.0
     if p:

@@ -38,7 +38,8 @@ class Problem:
     rows of each run; ``floor`` is the resolution of each output's numbers, or what the simulation itself is
     unsure by, below which no noise is known. ``rates`` has the outputs that only drift, and the rows by which
     the values are apart whose rate is judged. ``shown_sd`` has the noise of outputs that nobody stated, and
-    that the recording shows to be less than what is left.
+    that the recording shows to be less than what is left. ``memory`` has the rows to one independent value of
+    the outputs whose rest is known to be no noise.
     """
 
     case: Case
@@ -52,6 +53,12 @@ class Problem:
     slices: tuple[slice, ...]
     rates: Mapping[str, int] = field(default_factory=dict)
     shown_sd: Mapping[str, float] = field(default_factory=dict)
+    memory: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def values(self) -> float:
+        """Values that count of all outputs, of those with a memory the independent ones."""
+        return sum(float(kept.sum()) / self.memory.get(name, 1.0) for name, kept in self.kept.items())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -251,11 +258,17 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
     The rows are chosen once, on the residual of the refitted simulation, so that every hypothesis is
     judged on the same rows. An outlier is one of the recording. Where a recording is smooth, or an input
     moves sharply, a value to which its neighbours lead is none: there it is the simulation that jumps, as
-    one does that is late by a part of a row, and is far off in that row alone.
+    one does that is late by a part of a row, and is far off in that row alone. Where an input's own value is
+    none that it can have, the simulation jumps by that.
     """
     from dataclasses import replace
 
     counted = {}
+    misread = np.zeros(problem.rows, dtype=bool)
+    for run, rows in zip(problem.runs, problem.slices, strict=True):
+        for driver in problem.case.drivers:
+            if driver.name in run.columns and run.rows >= ROWS.fewest_for_outliers:
+                misread[rows] |= _misread(run.columns[driver.name])
     for name, r in residual.items():
         good = problem.kept[name].copy()
         for order, beside in _neighbours(problem):
@@ -275,7 +288,8 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
                 rough = max(_roughness(recorded), problem.floor[name])
                 smooth = rough < ROWS.smooth * noise
                 least = ROWS.isolated * (rough if smooth else noise)
-                far &= ~(smooth | beside[counting]) | _off_neighbours(recorded, far, least)
+                plain = misread[order][counting] | ~(smooth | beside[counting])
+                far &= plain | _off_neighbours(recorded, far, least)
             far &= ~answering
             if 0 < far.sum() <= max(1, ROWS.outliers * len(places)):
                 good[places[far]] = False
@@ -313,6 +327,8 @@ def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:
         if driver.name not in run.columns or run.rows < ROWS.fewest_for_outliers:
             continue
         column = run.columns[driver.name]
+        if (misread := _misread(column)).any():
+            column = np.interp(np.arange(run.rows), np.flatnonzero(~misread), column[~misread])
         bends = np.abs(np.diff(column, n=2, prepend=column[0], append=column[-1]))
         least = max(1.4826 * float(np.median(bends)), 1e-6 * float(np.ptp(column)))
         sharp |= bends > ROWS.isolated * least
@@ -321,6 +337,16 @@ def _moved_sharply(problem: Problem, rows: slice) -> NDArray[np.bool_]:
         beside[shift:] |= sharp[:-shift]
         beside[:-shift] |= sharp[shift:]
     return beside
+
+
+def _misread(column: Array) -> NDArray[np.bool_]:
+    """Return which single values of an input are farther outside of all others than these are apart."""
+    far = np.zeros(len(column), dtype=bool)
+    low, *_, high = np.argsort(column)
+    others = np.delete(column, [low, high])
+    for at in (low, high):
+        far[at] = min(abs(column[at] - others.min()), abs(column[at] - others.max())) > np.ptp(others) > 0
+    return far
 
 
 def _roughness(values: Array) -> float:

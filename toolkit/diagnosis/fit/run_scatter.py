@@ -305,8 +305,9 @@ def _output(problem: Problem, made: Fit, name: str, columns: Array) -> _Output:
     for rows in runs:
         bare[rows] -= own[rows] @ np.linalg.lstsq(own[rows], residual[rows], rcond=1e-9)[0]
     noise: Autoregression = fit_noise(
-        bare, where, floor=problem.floor[name], sd=problem.sd_of(name), used=2 * len(runs)
-    )
+        bare, where, floor=problem.floor[name], sd=problem.sd_of(name), used=2 * len(runs),
+        memory=problem.memory.get(name),
+    )  # fmt: skip
     white = whiten(np.hstack([columns[where.index], own, residual[:, None]]), where, noise)
     J, X, y = white[:, :-3], white[:, -3:-1], white[:, -1]
     return _Output.of(

@@ -132,7 +132,8 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out.
 
     Of an equation runs that differ ask as well: an input that came once moves its run as long as it rings.
-    So does, where nothing is named, a rest that is more than the sensor's noise: what rings is coloured.
+    So does a rest that is known to be no noise, and in an equation, where nothing is named, one that is more
+    than the sensor's noise: what rings is coloured.
     """
     strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
     motion = problem.model.capability.motion
@@ -142,7 +143,7 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     return tuple(
         name
         for name in problem.names
-        if strained or name in affected or (bare and _wanders(problem, base, name))
+        if strained or name in affected or name in problem.memory or (bare and _wanders(problem, base, name))
     )
 
 
@@ -159,7 +160,7 @@ def _next(
 ) -> tuple[Law, Fit, HeldOut] | None:
     """Return the next law with the fit beside it, None where none stands."""
     problem = search.problem
-    weight = 0.5 * math.log(sum(int(kept.sum()) for kept in problem.kept.values()))
+    weight = 0.5 * math.log(max(problem.values, 1.0))
     screen = LinearisedFit.of(problem, base)
     present = {applied.key for applied in base.active}
     trials = [

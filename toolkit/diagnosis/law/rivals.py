@@ -36,8 +36,9 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     """Return a search and its laws, or laws alone where these have fewer parameters and foretell as well.
 
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
-    stand beside effects, and in an equation where these leave more than the sensor's noise: what is missing
-    there rings, coloured noise takes it up, and no structure shows. In an equation a name that leaves more
+    stand beside effects, where these leave what is known to be no noise, and in an equation where they leave
+    more than the sensor's noise: what is missing there rings, coloured noise takes it up, and no structure
+    shows. In an equation a name that leaves more
     than the sensor's noise where laws do not is lost: it imitates them. Else what takes nearly all that the
     laws take keeps its name, and any other loses it where all that is named has another size beside them.
     """
@@ -49,7 +50,7 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     leaves_noise = _leaves_process_noise(search)
     least = LAWS.same if leaves_noise else VERDICT.nearly
     # Laws take at most all there is: where one effect takes nearly that, it keeps its name whatever they are.
-    settled = len(_effects(search)) < 2 and _same(
+    settled = len(_effects(search)) < 2 and take_as_much(
         search.problem, search.held_refitted, search.held_augmented, None, least=least
     )
     if settled and not leaves_noise:
@@ -65,14 +66,17 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
         return search, laws if alone.complete else replace(laws, complete=False)
     if bare.problem.shown_sd and leaves_noise and not _process_noise(search, alone.fit):
         return bare, alone
-    alike = _same(search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least)
+    alike = take_as_much(
+        search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least
+    )
     if alike and not _does_with_fewer(search, alone):
         return search, laws
     if any(_holds_beside(laws, step) for step in search.steps):
-        if _parameters(alone.fit) >= _parameters(laws.fit):
-            return search, laws
+        more = parameters_of(alone.fit) - parameters_of(laws.fit)
         beside_laws = laws.held_out if predicting else search.held_augmented
-        if alone.held_out.total - beside_laws.total < -STEP.least_gain:
+        # Of as many parameters it has to be better, of fewer no worse.
+        least = STEP.least_gain if more == 0 else -STEP.least_gain
+        if more > 0 or alone.held_out.total - beside_laws.total < least:
             return search, laws
     elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
@@ -88,7 +92,7 @@ def _does_with_fewer(search: Search, alone: Laws) -> bool:
     problem, named = search.problem, search.held_augmented
     return (
         len(alone.listed) < len(_effects(search))
-        and _parameters(alone.fit) < _parameters(search.augmented)
+        and parameters_of(alone.fit) < parameters_of(search.augmented)
         and alone.held_out.total - named.total >= STEP.least_gain
         and all(
             _error(problem, alone.held_out, name) <= _error(problem, named, name)
@@ -123,7 +127,9 @@ def _holds_beside(laws: Laws, step: Step) -> bool:
 
 
 def _leaves_process_noise(search: Search) -> bool:
-    """Tell whether an equation with the effects found leaves more than its sensors' noise."""
+    """Tell whether the effects found leave what is no noise, or in an equation more than its sensors'."""
+    if search.problem.memory:
+        return True
     motion = search.problem.model.capability.motion
     if motion is None or not motion.integrates:
         return False
@@ -189,7 +195,7 @@ def _error(problem: Problem, held_out: HeldOut, name: str) -> float:
     return float(np.mean(away**2))
 
 
-def _same(
+def take_as_much(
     problem: Problem, without: HeldOut, named: HeldOut, laws: HeldOut | None, *, least: float = LAWS.same
 ) -> bool:
     """Tell whether effects take nearly all that laws in their place take: these are then their own formulas.
@@ -208,7 +214,8 @@ def _same(
     return True
 
 
-def _parameters(fit: Fit) -> int:
+def parameters_of(fit: Fit) -> int:
+    """Return how many parameters of effects and laws a fit has searched."""
     return sum(len(applied.searched) for applied in fit.active)
 
 
@@ -250,7 +257,7 @@ def _is_minor(search: Search, laws: Laws, bare: Fit, alone: HeldOut) -> bool:
     """
     both, named = laws.held_out.total, search.held_augmented.total
     return (
-        2 * _parameters(bare) <= _parameters(laws.fit)
+        2 * parameters_of(bare) <= parameters_of(laws.fit)
         and alone.total - named >= STEP.least_gain
         and both - named > LAWS.outdoes * (both - alone.total)
     )
@@ -283,7 +290,7 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
             augmented, held_out = search.refitted, search.held_refitted
     except FitError:
         return None
-    if _same(problem, held_out, search.held_augmented, scores):
+    if take_as_much(problem, held_out, search.held_augmented, scores):
         return None
     values = {applied.key: applied for applied in (*bare.active, *augmented.active)}
     searched = replace(

@@ -296,7 +296,7 @@ def _cost_in_place(problem: Problem, active: AppliedEffect) -> float:
 
 def _weight(problem: Problem) -> float:
     """Return what a parameter costs of the log-likelihood (BIC)."""
-    return 0.5 * math.log(sum(int(rows.sum()) for rows in problem.kept.values()))
+    return 0.5 * math.log(max(problem.values, 1.0))
 
 
 def joint_fit(

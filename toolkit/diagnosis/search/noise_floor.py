@@ -9,14 +9,15 @@ fitted on some runs, foretell it on the others better than they foretell noise o
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, draws, fit_noise
+from toolkit.diagnosis.fit.noise import Layout, draws, fit_noise, memory_of
 from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts, shows_sensor, spread
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
-from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE, VERDICT
+from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE, UNSEEN, VERDICT
 from toolkit.diagnosis.search.unexplained import StructureFound
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 LARGE = "a floor above a tenth of the output's spread"
 LONG = "a floor that wanders as long as the recording"
+SMOOTH = "a floor far above its sensor's noise"
 
 
 def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tuple[StructureFound, ...]:
@@ -48,6 +50,10 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
             found += [] if follows is None else [follows]
             if _is_untestable(problem, base, name, parts):
                 found.append(_untested(name, LONG, 0.0))
+        if all(each.output != name for each in found) and (
+            name in problem.memory or _is_smooth_over_inputs(problem, name, parts)
+        ):
+            found.append(_untested(name, SMOOTH, 0.0))
     return tuple(found)
 
 
@@ -71,6 +77,12 @@ def _is_untestable(problem: Problem, base: Fit, name: str, parts: ChannelNoise) 
     return rows <= ROWS.fewest * noise.correlation_rows and parts.total_sd > least
 
 
+def _is_smooth_over_inputs(problem: Problem, name: str, parts: ChannelNoise) -> bool:
+    """Tell whether readings in no order leave what neighbours in their inputs agree about, and it matters."""
+    matters = parts.total_sd > VERDICT.accuracy * spread(problem, name)
+    return not problem.case.has_order and matters and parts.process_sd > NOISE.mismatch * parts.sensor_sd
+
+
 def _untested(name: str, reason: str, gain: float) -> StructureFound:
     return StructureFound(output=name, variables=(), reason=reason, gain=gain, p_value=1.0, rest=True)
 
@@ -88,6 +100,46 @@ def beyond_noise(problem: Problem, base: Fit) -> dict[str, ChannelNoise]:
         for name, part in parts.items()
         if not part.is_sensor and _is_large(problem, base, name, part)
     }
+
+
+def weighed_as_mismatch(problem: Problem, base: Fit, refitted: Fit, *, may_be_noise: bool = False) -> Problem:
+    """Return a problem whose outputs with a rest that is no noise have its memory, and no others one.
+
+    Each row of such a rest is foretold by the row before, whatever it is, by less than the corner that what
+    is right makes in it: a likelihood of single rows prefers what is smooth to what is true. Its size is what
+    counts, over as many values as its memory leaves independent. Effects that take nearly all of it may leave
+    noise; what less leaves is none for being smaller.
+
+    Parameters
+    ----------
+    refitted : the fit without effects
+    may_be_noise : a rest may be noise, too, that is above the sensor's and matters
+    """
+    if not problem.case.has_order:
+        return problem
+    memory, beyond = {}, beyond_noise(problem, base)
+    for name in (each for each in problem.names if problem.kept[each].any() and each not in problem.rates):
+        parts = noise_parts(problem, base, name)
+        known = name in beyond or (
+            name in problem.memory and not _took_nearly_all(problem, base, refitted, name)
+        )
+        known |= may_be_noise and parts.total_sd > VERDICT.accuracy * spread(problem, name)
+        if not known or parts.process_sd <= NOISE.mismatch * parts.sensor_sd:
+            continue
+        where = problem.layout(name)
+        noise = fit_noise(base.residual[name][where.index], where, floor=problem.floor[name])
+        # Runs are independent, whatever stays the same in each of them.
+        own = float(np.median([problem.kept[name][rows].sum() for rows in problem.slices]))
+        rows = min(memory_of(noise, int(own)), own)
+        if where.n >= UNSEEN.runs * rows:  # fewer values show nothing
+            memory[name] = rows
+    return replace(problem, memory=memory)
+
+
+def _took_nearly_all(problem: Problem, base: Fit, refitted: Fit, name: str) -> bool:
+    kept = problem.kept[name]
+    before, after = (float(np.mean(made.residual[name][kept] ** 2)) for made in (refitted, base))
+    return after < (1 - VERDICT.nearly) * before
 
 
 def _is_large(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bool:

@@ -113,7 +113,7 @@ class LinearisedFit:
         columns, sizes = jacobian(problem, base)
         layouts = {name: problem.layout(name) for name in problem.names}
         plain = {
-            name: Autoregression(reflection=(), sd=autoregression.marginal_sd)
+            name: Autoregression(reflection=(), sd=autoregression.marginal_sd, memory=autoregression.memory)
             for name, autoregression in base.noise.items()
         }
         coloured, white = (
@@ -126,9 +126,9 @@ class LinearisedFit:
         return replace(bare, log_likelihood=reached)
 
     @property
-    def n(self) -> int:
-        """Number of values that count."""
-        return sum(where.n for where in self.layouts.values())
+    def n(self) -> float:
+        """Number of values that count, of what is no noise the independent ones."""
+        return self.problem.values
 
     def prepare(self, candidates: Sequence[CandidateEffect]) -> None:
         """Have the simulations made at once that scoring the candidates asks for."""
@@ -266,7 +266,7 @@ class LinearisedFit:
 
     @property
     def _is_coloured(self) -> bool:
-        return any(autoregression.reflection for autoregression in self.base.noise.values())
+        return any(autoregression.is_coloured for autoregression in self.base.noise.values())
 
     def rows(self, directions: Stacked) -> Array:
         """Return responses whitened by the fit's noise, (values and priors, columns)."""
@@ -378,6 +378,7 @@ class LinearisedFit:
                 floor=problem.floor[name],
                 sd=problem.sd_of(name),
                 used=len(solution) // len(self.layouts),
+                memory=problem.memory.get(name),
             )
             total += log_likelihood(remaining, where, noise_there[name])
         coefficients = (

@@ -28,7 +28,7 @@ from toolkit.diagnosis.search.channel_factors import leaves_noise, with_units_ju
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.in_place import foretold_best
 from toolkit.diagnosis.search.lattice import lattice_of
-from toolkit.diagnosis.search.noise_floor import hidden_in_noise
+from toolkit.diagnosis.search.noise_floor import hidden_in_noise, weighed_as_mismatch
 from toolkit.diagnosis.search.pairs import best_pair
 from toolkit.diagnosis.search.proposals import NONE, proposals
 from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
@@ -110,7 +110,8 @@ class Search:
     """What a search has found, with the fits that show it.
 
     ``undecided`` are the effects that the last look of all showed, confirmed by unseen rows or not;
-    ``disagreed`` is the parameter that its runs disagree about.
+    ``disagreed`` is the parameter that its runs disagree about; ``kept`` tells that its effects are named,
+    whatever else stays.
     """
 
     problem: Problem
@@ -129,6 +130,7 @@ class Search:
     scatter: tuple[RunScatter, ...] = ()
     undecided: frozenset[str] = frozenset()
     disagreed: RunParameter | None = None
+    kept: bool = False
 
     def variance(self, at: int) -> float:
         """Return the variance of a parameter of the augmented fit, by its place among them.
@@ -141,6 +143,10 @@ class Search:
 
 def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     """Search for what a simulation leaves out.
+
+    A rest that is no noise is weighed by its size. What takes too little of it to be seen so may still show
+    in single rows, by a noise of the rest's colour: the corners that a friction or a loop makes. Of a rest
+    that may be noise the rows are asked first, and its size where they show nothing.
 
     Parameters
     ----------
@@ -157,6 +163,21 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     if problem.rates:
         refitted = fit(problem, start=refitted.p)
     folds = folds_of(problem, refitted)
+    weighed = weighed_as_mismatch(problem, refitted, refitted)
+    first, second = problem, weighed_as_mismatch(problem, refitted, refitted, may_be_noise=True)
+    if weighed.memory:
+        first, second = weighed, problem
+    found = _searched(first, folds, nominal, fit(first, start=refitted.p), seed, budget)
+    if found.steps or found.skipped or (not weighed.memory and not second.memory):
+        return found
+    other = _searched(second, folds, nominal, fit(second, start=refitted.p), seed, budget)
+    return other if other.steps else found
+
+
+def _searched(
+    problem: Problem, folds: Folds, nominal: Fit, refitted: Fit, seed: int, budget: TimeBudget
+) -> Search:
+    """Return what steps from a refit lead to."""
     wrong = wrong_units(problem, (nominal, refitted))
     listed = candidates(problem)
     if wrong and not is_listed(wrong[0], listed):
@@ -175,6 +196,12 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         for turn in range(STEP.most_effects + 1):
             share = STEP.later if turn else STEP.first
             base, steps = with_a_size(problem, base, steps)
+            if problem.memory and steps:
+                problem = weighed_as_mismatch(problem, base, refitted)
+                refitted = fit(problem, start=refitted.p)
+                base = fit(problem, base.active, start=base.p)
+                held_refitted = hold_out(problem, folds, (), refitted)
+                held_base = hold_out(problem, folds, base.active, base)
 
             def fitting(scored: Sequence[Scored], turn: int = turn) -> None:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
