@@ -12,6 +12,7 @@ from toolkit.diagnosis.fit.noise import (
     fit_noise,
     layout,
     log_likelihood,
+    memory_of,
     predictor,
     whiten,
 )
@@ -157,3 +158,28 @@ def test_segments_are_whitened_as_each_is_alone(order):
     np.testing.assert_allclose(
         whiten(values, where, noise), np.concatenate(alone)[:, 0], rtol=1e-10, atol=1e-12
     )
+
+
+def test_rows_with_a_memory_are_worth_the_values_that_it_leaves_independent():
+    x = np.random.default_rng(3).normal(size=40)
+    each = fit_noise(x, _one(40), floor=1e-12)
+    repeated = fit_noise(np.repeat(x, 5), _one(200), floor=1e-12, memory=5.0)
+    assert repeated.marginal_sd == pytest.approx(np.sqrt(np.mean(x**2)))
+    white = Autoregression(reflection=(), sd=each.marginal_sd)
+    of_rows = log_likelihood(np.repeat(x, 5), _one(200), repeated)
+    assert of_rows == pytest.approx(log_likelihood(x, _one(40), white))
+    assert not repeated.is_coloured
+    assert repeated.correlation_rows == 5.0
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.5, 0.9])
+def test_a_memory_is_bartletts_of_the_mean_for_noise_that_does_not_swing(phi):
+    noise = Autoregression(reflection=(phi,), sd=1.0)
+    assert memory_of(noise, 400) == pytest.approx((1 + phi) / (1 - phi), rel=1e-9)
+
+
+def test_what_swings_has_no_mean_and_a_memory_all_the_same():
+    noise = Autoregression(reflection=(-0.9,), sd=1.0)
+    assert noise.correlation_rows == 1.0
+    # 1 + 2 sum of phi^2k
+    assert memory_of(noise, 400) == pytest.approx((1 + 0.81) / (1 - 0.81), rel=1e-9)

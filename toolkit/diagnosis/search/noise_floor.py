@@ -78,7 +78,7 @@ def _is_untestable(problem: Problem, base: Fit, name: str, parts: ChannelNoise) 
 
 
 def _is_smooth_over_inputs(problem: Problem, name: str, parts: ChannelNoise) -> bool:
-    """Tell whether readings without a time leave what neighbours in their inputs agree about, and it matters."""
+    """Tell whether readings without a time leave what their neighbours agree about, and it matters."""
     matters = parts.total_sd > VERDICT.accuracy * spread(problem, name)
     return not problem.case.has_time and matters and parts.process_sd > NOISE.mismatch * parts.sensor_sd
 

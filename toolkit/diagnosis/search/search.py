@@ -194,7 +194,6 @@ def _searched(
     proposed = NONE
     try:
         for turn in range(STEP.most_effects + 1):
-            share = STEP.later if turn else STEP.first
             base, steps = with_a_size(problem, base, steps)
             if problem.memory and steps:
                 problem = weighed_as_mismatch(problem, base, refitted)
@@ -202,6 +201,11 @@ def _searched(
                 base = fit(problem, base.active, start=base.p)
                 held_refitted = hold_out(problem, folds, (), refitted)
                 held_base = hold_out(problem, folds, base.active, base)
+            share = STEP.later if turn else STEP.first
+            if (
+                turn and problem.memory
+            ):  # beside a rest that is no noise, what leaves more than it takes imitates
+                share = STEP.least_behind
 
             def fitting(scored: Sequence[Scored], turn: int = turn) -> None:
                 names = ", ".join(dict.fromkeys(trial.candidate.name for trial in scored))
