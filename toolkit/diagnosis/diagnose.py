@@ -29,7 +29,7 @@ from toolkit.diagnosis.fit.predict import prediction_csv, prediction_names
 from toolkit.diagnosis.fit.problem import Problem, problem_of, without_outliers
 from toolkit.diagnosis.fit.row_order import by_inputs, seed_of
 from toolkit.diagnosis.law.foretelling import before_nothing
-from toolkit.diagnosis.law.learn import Laws, learned
+from toolkit.diagnosis.law.learn import Laws, learned, learned_by_size
 from toolkit.diagnosis.law.resembling import with_resemblances
 from toolkit.diagnosis.law.rivals import judged_by_laws, without_imitations, without_untested
 from toolkit.diagnosis.policy import BUDGET
@@ -148,6 +148,7 @@ def _diagnosed(
                 outcome = kept_beside_laws(outcome, laws)
                 if outcome.kept:
                     laws = learned(outcome, withdrawn=False, budget=budget)
+                outcome, laws = learned_by_size(outcome, laws, budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
                 outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
                 outcome = without_untested(outcome, laws)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import sizes_off
-from toolkit.diagnosis.fit.folds import hold_out, matters
+from toolkit.diagnosis.fit.folds import hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
@@ -32,6 +32,7 @@ from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.bends import at_bound
 from toolkit.diagnosis.search.forward_step import joint_fit
+from toolkit.diagnosis.search.noise_floor import weighed_as_mismatch
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
@@ -112,6 +113,21 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
     except BudgetSpentError:
         complete = False
     return Laws(listed=tuple(listed), fit=base, held_out=held_out, complete=complete)
+
+
+def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
+    """Return a search without effects and its laws, by the rest's size where these foretell better.
+
+    Asked where the laws that rows show leave what is no noise.
+    """
+    by_size, problem = search.by_size, search.problem
+    if search.steps or by_size is None or not laws.complete:
+        return search, laws
+    if laws.listed and not weighed_as_mismatch(by_size.problem, laws.fit, search.refitted).memory:
+        return search, laws
+    others = learned(by_size, withdrawn=False, budget=budget)
+    errors = [unseen_error(problem, each.held_out) for each in (laws, others)]
+    return (by_size, others) if others.listed and errors[1] < errors[0] else (search, laws)
 
 
 def _unlocked(problem: Problem, base: Fit, outputs: Sequence[str], before: Sequence[Law]) -> list[Law]:

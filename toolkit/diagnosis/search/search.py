@@ -14,7 +14,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.drift import judged_by_rates
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
-from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters
+from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.problem import Problem, without_outliers
 from toolkit.diagnosis.fit.run_scatter import (
     RunParameter,
@@ -111,7 +111,7 @@ class Search:
 
     ``undecided`` are the effects that the last look of all showed, confirmed by unseen rows or not;
     ``disagreed`` is the parameter that its runs disagree about; ``kept`` tells that its effects are named,
-    whatever else stays.
+    whatever else stays; ``by_size`` is one of a rest that is no noise, which found no effect either.
     """
 
     problem: Problem
@@ -131,6 +131,7 @@ class Search:
     undecided: frozenset[str] = frozenset()
     disagreed: RunParameter | None = None
     kept: bool = False
+    by_size: Search | None = None
 
     def variance(self, at: int) -> float:
         """Return the variance of a parameter of the augmented fit, by its place among them.
@@ -144,9 +145,10 @@ class Search:
 def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     """Search for what a simulation leaves out.
 
-    A rest that is no noise is weighed by its size. What takes too little of it to be seen so may still show
-    in single rows, by a noise of the rest's colour: the corners that a friction or a loop makes. Of a rest
-    that may be noise the rows are asked first, and its size where they show nothing.
+    Rows are weighed by a noise of the rest's colour first: what leaves noise is found so, however small. In a
+    rest that no colour makes noise each row foretells the next, and what is right makes corners in it. Where
+    what was found leaves such a rest, it is weighed by its size, and what foretells unseen rows better
+    stands.
 
     Parameters
     ----------
@@ -163,15 +165,20 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     if problem.rates:
         refitted = fit(problem, start=refitted.p)
     folds = folds_of(problem, refitted)
+    found = _searched(problem, folds, nominal, refitted, seed, budget)
     weighed = weighed_as_mismatch(problem, refitted, refitted)
-    first, second = problem, weighed_as_mismatch(problem, refitted, refitted, may_be_noise=True)
-    if weighed.memory:
-        first, second = weighed, problem
-    found = _searched(first, folds, nominal, fit(first, start=refitted.p), seed, budget)
-    if found.steps or found.skipped or (not weighed.memory and not second.memory):
+    leaves_noise = not weighed_as_mismatch(weighed, found.augmented, refitted).memory
+    if found.skipped or (found.steps and leaves_noise):
         return found
-    other = _searched(second, folds, nominal, fit(second, start=refitted.p), seed, budget)
-    return other if other.steps else found
+    if not weighed.memory:
+        weighed = weighed_as_mismatch(problem, refitted, refitted, may_be_noise=True)
+    if not weighed.memory:
+        return found
+    by_size = _searched(weighed, folds, nominal, fit(weighed, start=refitted.p), seed, budget)
+    if by_size.steps:
+        errors = [unseen_error(problem, each.held_augmented) for each in (found, by_size)]
+        return by_size if not found.steps or errors[1] < errors[0] else found
+    return found if found.steps else replace(found, by_size=by_size)
 
 
 def _searched(
