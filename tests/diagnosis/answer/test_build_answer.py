@@ -29,7 +29,7 @@ def searched(gain, smooth_gain, *, columns=6, name="wear", rest=False):
         output="FY", variables=("SA",), gain=2 * smooth_gain, p_value=1e-9, rest=rest, columns=columns
     )
     return SimpleNamespace(
-        problem=SimpleNamespace(kept={"FY": np.ones(ROWS, dtype=bool)}),
+        problem=SimpleNamespace(kept={"FY": np.ones(ROWS, dtype=bool)}, values=float(ROWS)),
         steps=(SimpleNamespace(active=active, gain=gain),),
         structure_before=(smooth,),
     )

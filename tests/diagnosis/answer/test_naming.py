@@ -22,7 +22,7 @@ def search(*, explained, unexplained, before, after, zero=0.0):
         slices=(slice(0, 50), slice(50, 100)), rates={},
     )  # fmt: skip
     return Of(
-        problem=problem, steps=(step,), structure=(rest,), errors=(errors,), skipped=(),
+        problem=problem, steps=(step,), structure=(rest,), errors=(errors,), skipped=(), kept=False,
         held_refitted=Of(simulated={"y": zero + before * wave}),
         held_augmented=Of(simulated={"y": after * wave}),
     )  # fmt: skip
@@ -46,6 +46,23 @@ def test_what_takes_more_of_the_unseen_rows_than_it_leaves_is_not_outweighed(bef
     """A coloured noise weighs a slow error of half a volt little; the mean of a rest is any zero's."""
     found = search(explained=20.0, unexplained=60.0, before=before, after=after, zero=zero)
     assert naming.mostly_unknown(found) is unknown
+
+
+@pytest.mark.parametrize(
+    ("left", "parameters", "kept"), [(0.60, 3, True), (0.60, 1, False), (0.30, 3, False)]
+)
+@pytest.mark.usefixtures("plain")
+def test_a_name_is_not_withdrawn_for_a_law_that_takes_no_more(monkeypatch, left, parameters, kept):
+    """What takes less than it leaves is named all the same, where the best of all laws takes no more."""
+    found = search(explained=20.0, unexplained=60.0, before=0.71, after=0.60)
+    alone = Of(simulated={"y": left / 0.60 * found.held_augmented.simulated["y"]})
+    laws = Of(complete=True, listed=(Of(predicts=True),), fit=parameters, held_out=alone)
+    found.augmented, found.problem.judged = 2, lambda _, values: values
+    monkeypatch.setattr(naming, "parameters_of", lambda fit: fit)
+    monkeypatch.setattr(naming, "replace", lambda of, **changed: Of(**{**vars(of), **changed}))
+    assert naming.mostly_unknown(found)
+    assert naming.kept_beside_laws(found, laws).kept is kept
+    assert naming.mostly_unknown(naming.kept_beside_laws(found, laws)) is not kept
 
 
 @pytest.mark.parametrize(("step", "unknown"), [("step 3: joint fits", False), ("swaps", True)])

@@ -40,6 +40,17 @@ def test_what_answers_a_sharp_move_is_no_outlier(noise):
     assert without_outliers(problem_of(noise), {"FY": noise}).kept["FY"].all()
 
 
+@pytest.mark.parametrize(("reading", "left_out"), [(-8_384_677.0, [120]), (2.0, [])])
+def test_a_value_that_an_input_cannot_have_is_no_sharp_move(noise, reading, left_out):
+    driver = 0.1 * RAMP
+    driver[120] = reading
+    recorded = RAMP + 0.1 * noise  # smooth, and without an answer to that reading
+    residual = 0.1 * noise - 10.0 * (driver - 0.1 * RAMP)
+    residual[120] = -10.0 * (driver[120] - 0.1 * RAMP[120])
+    kept = without_outliers(problem_of(recorded, driver), {"FY": residual}).kept["FY"]
+    assert np.flatnonzero(~kept).tolist() == left_out
+
+
 @pytest.mark.parametrize(("missed", "left_out"), [(-3.0, []), (12.0, [120]), (-12.0, [120])])
 def test_the_row_in_which_a_heater_is_switched_lies_between_its_neighbours(missed, left_out):
     """A block heated from row 120 on: over that row it rises by 9.8 K, and by 9.3 K over the next."""

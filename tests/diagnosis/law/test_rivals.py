@@ -310,7 +310,7 @@ def test_two_names_go_where_a_single_law_of_fewer_parameters_does_better(
     monkeypatch.setattr(rivals, "learned", lambda *_, **__: alone)
     monkeypatch.setattr(rivals, "_leaves_process_noise", lambda _: True)
     monkeypatch.setattr(rivals, "_process_noise", lambda *_: True)
-    monkeypatch.setattr(rivals, "_parameters", lambda fit: 1 if fit is alone.fit else 3)
+    monkeypatch.setattr(rivals, "parameters_of", lambda fit: 1 if fit is alone.fit else 3)
     nothing_beside = Laws(listed=(), fit=named, held_out=search.held_augmented)
     judged, listed = judged_by_laws(search, nothing_beside, seed=1, budget=ample())
     assert (judged.steps == steps) is stay
