@@ -97,7 +97,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[PlanSessi
 
     if order.out is not None:
         _refuse_filled(order.out)
-    if order.minutes is not None and not (math.isfinite(order.minutes) and order.minutes > 0):
+    if order.minutes is not None and not order.minutes > 0:
         raise _wrong("a time cannot be used", "--minutes", order.minutes, "minutes above 0")
     record, loads, check, text, notes = _basis(registry, order)
     demands = [_demand(record, entry) for entry in order.demands]
