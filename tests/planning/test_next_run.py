@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.planning.class_factory import T, answer, found, problem, with_run, write_case
+from tests.planning.class_factory import T, found, problem, with_run, write_case
 from tests.planning.test_run_changes import steady_slide
 from toolkit.planning import next_run
 from toolkit.planning.drives import Drive, fastest
@@ -22,7 +22,7 @@ EFFECT = found("channel_delay", "filter_lag")
 @pytest.fixture(scope="module")
 def search(tmp_path_factory: pytest.TempPathFactory) -> RunSearch:
     posed = problem(write_case(tmp_path_factory.mktemp("class")))
-    members = members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    members = members_of(posed, (EFFECT,), EFFECT)
     return RunSearch(problem=posed, members=members, limits=RunLimits())
 
 
@@ -39,7 +39,7 @@ def test_the_proposed_run_is_faster_and_names_the_true_member(search: RunSearch,
     assert chosen.power > max(repeat.power, 0.9)
     assert chosen.together == ()
     more = with_run(tmp_path, chosen.run.columns["u"], seed=9)
-    first, second = members_of(more, answer(more.case.sha256, EFFECT), EFFECT)
+    first, second = members_of(more, (EFFECT,), EFFECT)
     assert first.label == "channel_delay on F"
     assert first.fit.log_posterior - second.fit.log_posterior > 3
 
@@ -52,7 +52,7 @@ def test_the_power_is_that_of_the_nearest_of_the_others() -> None:
 
 def test_the_budget_ends_the_search(tmp_path: Path) -> None:
     posed = problem(write_case(tmp_path))
-    members = members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    members = members_of(posed, (EFFECT,), EFFECT)
     spent = RunSearch(problem=posed, members=members, limits=RunLimits(), until=lambda: False)
     assert spent.best() == Change(run="r0.csv")
     assert len(T) == posed.runs[0].rows
