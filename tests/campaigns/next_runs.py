@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from tests.coverage.rows import exact_interval
-from tests.planning.class_factory import CASE, SIMULATOR, answer, found, problem
+from tests.planning.class_factory import CASE, SIMULATOR, found, problem
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.planning.members import Member, members_of
 from toolkit.planning.next_run import RunSearch
@@ -84,7 +84,7 @@ def written(
 
 def fitted(posed: Problem) -> tuple[Member, ...]:
     """Return both members, fitted to all recordings."""
-    return members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    return members_of(posed, (EFFECT,), EFFECT)
 
 
 def lead(members: tuple[Member, ...]) -> float:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pkgutil
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, Any, TypedDict, get_args
 
 import pytest
 from typer.main import get_command_from_info
 from typer.models import CommandInfo
 
 from tests.cli.one_command import run
-from toolkit.cli.command import ARGUMENT, Mark, _mark, answers
+from tests.commands import said
+from toolkit.cli.command import ARGUMENT, Mark, _mark, _word, answers
 from toolkit.cli.groups import leaves
 from toolkit.cli.main import command_tree
 from toolkit.cli.options import INTO_FILE, Output
@@ -90,6 +92,25 @@ def test_a_word_that_cannot_be_printed_is_refused_by_the_name_of_its_option() ->
     with pytest.raises(ToolkitError) as refused:
         run(weigh, "F\x1bY")
     assert refused.value.where == "LOAD"
+
+
+def test_no_command_takes_a_number_that_is_infinite_or_none(tmp_path: Path) -> None:
+    asked = set()
+    for name, leaf in leaves(command_tree()):
+        parameters = leaf.callback.__wrapped__._parameters
+        needed = [
+            "1" if "argument" in _mark(p) else f"{_word(p)}={tmp_path / 'new'}"
+            for p in parameters
+            if p.default is inspect.Parameter.empty and get_args(p.annotation)
+        ]
+        fractions = [p for p in parameters if get_args(p.annotation)[:1] in ((float,), (float | None,))]
+        for option in map(_word, fractions):
+            asked.add(option)
+            for wrong in ("inf", "nan", "-inf", "1e999"):
+                refused = said(*name.split(), *needed, f"{option}={wrong}", "--json")
+                assert refused.code == 2, (name, option, wrong)
+                assert option in refused.out
+    assert asked >= {"--budget", "--minutes", "--interval", "--memory", "--level"}
 
 
 def test_what_refuses_a_value_is_a_function_that_there_is() -> None:

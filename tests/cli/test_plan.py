@@ -107,7 +107,8 @@ def test_what_cannot_be_reached_names_the_nearest_plan_and_writes_nothing(run, q
         (["--u", "conicity=1 N", "--u", "conicity=2 N"], "plan-demand"),
         (["--u", "conicity=1 furlong"], "plan-demand"),
         (["--minutes", "0.5"], "plan-infeasible"),
-        (["--between-files", "inf"], "plan-infeasible"),
+        (["--between-files", "inf"], "usage"),
+        (["--minutes", "inf"], "usage"),
     ],
 )
 def test_what_cannot_be_planned_is_refused_by_its_rule(run, quick, arguments, rule):

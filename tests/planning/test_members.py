@@ -67,7 +67,7 @@ def test_the_noise_counts_under_which_two_are_less_apart() -> None:
 def test_members_are_fitted_in_each_others_place(tmp_path: Path) -> None:
     posed = problem(write_case(tmp_path))
     effect = found("channel_delay", "filter_lag")
-    members = members_of(posed, answer(posed.case.sha256, effect), effect)
+    members = members_of(posed, (effect,), effect)
     assert {m.label for m in members} == {"channel_delay on F", "filter_lag on F"}
     delay = next(m for m in members if m.label.startswith("channel_delay"))
     assert delay.fit.active[-1].values["delay"] == pytest.approx(DELAY, abs=0.002)
@@ -83,7 +83,7 @@ def test_a_class_of_which_one_member_can_be_fitted_is_refused(tmp_path: Path) ->
     posed = problem(write_case(tmp_path))
     effect = found("channel_delay", "conicity")  # there is no tire here
     with pytest.raises(ConfigError) as error:
-        members_of(posed, answer(posed.case.sha256, effect), effect)
+        members_of(posed, (effect,), effect)
     assert error.value.rule == "plan-next"
 
 
@@ -118,7 +118,7 @@ def test_a_run_in_which_derivatives_say_nothing_of_a_members_parameters_parts_no
     """A delay that is known to 0.1 s: of a slow sine that is a shift, of a fast one it may be whole waves."""
     posed = problem(write_case(tmp_path))
     effect = found("channel_delay", "filter_lag")
-    members = members_of(posed, answer(posed.case.sha256, effect), effect)
+    members = members_of(posed, (effect,), effect)
     late = next(m for m in members if m.label.startswith("channel_delay"))
     open_delay = np.diag([0.1**2, 0.1**2])
     wide = dataclasses.replace(late, fit=dataclasses.replace(late.fit, covariance=open_delay))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.planning.class_factory import T, answer, found, problem, with_run, write_case
+from tests.planning.class_factory import T, found, problem, with_run, write_case
 from tests.planning.test_run_changes import steady_slide
 from toolkit.planning import next_run
 from toolkit.planning.drives import Drive, fastest
@@ -21,8 +22,12 @@ EFFECT = found("channel_delay", "filter_lag")
 @pytest.fixture(scope="module")
 def search(tmp_path_factory: pytest.TempPathFactory) -> RunSearch:
     posed = problem(write_case(tmp_path_factory.mktemp("class")))
-    members = members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    members = members_of(posed, (EFFECT,), EFFECT)
     return RunSearch(problem=posed, members=members, limits=RunLimits())
+
+
+def anew(search: RunSearch, **other: Any) -> RunSearch:
+    return dataclasses.replace(search, judged={}, runs={}, dense={}, _alike={}, **other)
 
 
 def test_the_proposed_run_is_faster_and_names_the_true_member(search: RunSearch, tmp_path: Path) -> None:
@@ -34,7 +39,7 @@ def test_the_proposed_run_is_faster_and_names_the_true_member(search: RunSearch,
     assert chosen.power > max(repeat.power, 0.9)
     assert chosen.together == ()
     more = with_run(tmp_path, chosen.run.columns["u"], seed=9)
-    first, second = members_of(more, answer(more.case.sha256, EFFECT), EFFECT)
+    first, second = members_of(more, (EFFECT,), EFFECT)
     assert first.label == "channel_delay on F"
     assert first.fit.log_posterior - second.fit.log_posterior > 3
 
@@ -47,7 +52,7 @@ def test_the_power_is_that_of_the_nearest_of_the_others() -> None:
 
 def test_the_budget_ends_the_search(tmp_path: Path) -> None:
     posed = problem(write_case(tmp_path))
-    members = members_of(posed, answer(posed.case.sha256, EFFECT), EFFECT)
+    members = members_of(posed, (EFFECT,), EFFECT)
     spent = RunSearch(problem=posed, members=members, limits=RunLimits(), until=lambda: False)
     assert spent.best() == Change(run="r0.csv")
     assert len(T) == posed.runs[0].rows
@@ -68,7 +73,7 @@ def test_nothing_is_searched_beyond_certainty(search: RunSearch) -> None:
     best = again.best()
     factors = again.factors(best)
     assert len(again.judged) < sum(map(len, factors))
-    assert again._alternatives(best, 0).losses.tolist() == [-again.judged[best]]
+    assert again._alternatives(best, 0).losses.tolist() == [-again.judged[again.runs[best]]]
 
 
 def test_what_rows_leave_open_is_asked_of_a_run_that_may_be_better_alone(
@@ -83,15 +88,31 @@ def test_what_rows_leave_open_is_asked_of_a_run_that_may_be_better_alone(
         return completed(*given)
 
     monkeypatch.setattr(next_run, "completed", counted)
-    lazy = RunSearch(problem=search.problem, members=search.members, limits=RunLimits())
+    # So slow that no run is certain: the first that were would end the search.
+    limits = RunLimits(rates={"u": 0.2 * fastest(T, search.problem.runs[0].columns["u"])})
+    lazy = anew(search, limits=limits)
     best = lazy.best()
-    known = dict(lazy.judged)
-    assert len({*asked}) < len(known) / 2
+    assert max(lazy.judged.values()) < next_run._ENOUGH
+    assert len({*asked}) < 0.75 * len(lazy.judged)
     monkeypatch.setattr(next_run, "is_less", lambda *_: True)
-    every = RunSearch(problem=search.problem, members=search.members, limits=RunLimits())
+    every = anew(lazy)
     assert every.best() == best
-    assert every.judged[best] == known[best]
-    assert all(every.judged[change] <= bound + 1e-9 for change, bound in known.items())
+    assert every.judged[every.runs[best]] == lazy.judged[lazy.runs[best]]
+
+
+def test_the_first_run_that_is_certain_ends_the_search(search: RunSearch) -> None:
+    again = anew(search)
+    best = again.best()
+    assert again.judged[again.runs[best]] >= next_run._ENOUGH
+    assert list(again.judged)[-1] is again.runs[best]
+
+
+def test_changes_that_come_to_the_same_inputs_are_one_run(search: RunSearch) -> None:
+    again = anew(search)
+    course = Change(run="r0.csv", drives=(("u", Drive(cycles=0.5)),))
+    twins = [dataclasses.replace(course, mirrored=("u",)), dataclasses.replace(course, rate=2.0), course]
+    assert len({*map(again._run, twins)}) == 1
+    assert again._run(dataclasses.replace(course, sizes=(("u", 0.5),))) is not again._run(course)
 
 
 def test_of_runs_that_part_with_certainty_the_nearest_to_the_recording_counts(

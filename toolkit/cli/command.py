@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import math
 import pkgutil
 import typing
 from collections.abc import Callable, Mapping
@@ -17,6 +18,7 @@ from typing import Annotated, Any, TypedDict
 
 import typer
 
+from toolkit.errors import ConfigError
 from toolkit.printable import check_text, unprintable
 
 
@@ -59,12 +61,22 @@ class Command:
         return self._command(**values, **groups)
 
     def _check(self, values: Mapping[str, Any]) -> None:
-        """Refuse words that no document can print; a path is whatever the disk has, and is no such word."""
+        """Refuse words that no document can print, and numbers that are none.
+
+        A path is whatever the disk has, and is no such word. What has no limit is not stated: no command
+        takes a time, a size or a share that is infinite.
+        """
         for parameter in self._parameters:
             value = values[parameter.name]
-            for text in value if isinstance(value, list | tuple) else (value,):
-                if type(text) is str and unprintable(text):
-                    check_text(text, where=_word(parameter))
+            for given in value if isinstance(value, list | tuple) else (value,):
+                if type(given) is str and unprintable(given):
+                    check_text(given, where=_word(parameter))
+                if type(given) is float and not math.isfinite(given):
+                    raise ConfigError(
+                        "an option is no finite number", where=_word(parameter), got=given,
+                        expected="a number such as 1.5 or 2e3",
+                        next_step="state such a number, or leave the option out", rule="usage",
+                    )  # fmt: skip
 
     @functools.cached_property
     def _hints(self) -> dict[str, Any]:

@@ -181,18 +181,18 @@ def protocol(
     load: Annotated[
         list[str] | None, "At which load, '833 lbf'; repeatable; default: all.", Mark(metavar="LOAD")
     ] = None,
-    minutes: Annotated[float, "Time on the machine at most."] = math.inf,
+    minutes: Annotated[float | None, "Time on the machine at most."] = None,
     between_files: Annotated[
         float | None, "From one recording to the next; default 30.", Mark(metavar="SECONDS", min=0.0)
     ] = None,
     sliding: Annotated[
-        float, "Energy that may slide away: wear of the tread.", Mark(metavar="KJ")
-    ] = math.inf,
+        float | None, "Energy that may slide away: wear of the tread.", Mark(metavar="KJ")
+    ] = None,
     rise: Annotated[
-        float,
+        float | None,
         "Largest temperature rise of the tread above the room; pauses keep it below.",
         Mark(metavar="K"),
-    ] = math.inf,
+    ] = None,
     out: Annotated[
         Path | None, "Folder for protocol.toml and the plan.toml of `toolkit simulate`.", INTO_FOLDER
     ] = None,
@@ -215,14 +215,17 @@ def protocol(
 
     order = ProtocolOrder(
         like=tuple(like or ()), spread=tuple(spread or ()), demands=tuple(u or ()), loads=tuple(load or ()),
-        minutes=minutes,
-        between_files_s=between_files, sliding_kJ=sliding, rise_K=rise,
+        minutes=_most(minutes), between_files_s=between_files, sliding_kJ=_most(sliding), rise_K=_most(rise),
         basis=place.basis(calibration=calibration, draft=draft),
     )  # fmt: skip
     opened = document_template(template, out)
     with output.progress("planning") as step:
         planned, text = plan_test(order, out, template=opened, tell=step)
     return answered(planned, text, output)
+
+
+def _most(limit: float | None) -> float:
+    return math.inf if limit is None else limit
 
 
 @app.command("next")

@@ -103,7 +103,7 @@ def parse_demand(text: str) -> Demand:
         return Demand(name=name, SA_rad=angle)
     if written == "%":
         return Demand(name=name, share=size / 100, SA_rad=angle)
-    factor = None if written is None else _factor(written, declared.unit)
+    factor = None if written is None else factor_to(declared.unit, written)
     if factor is None:
         raise _wrong("a demand has no unit that fits", text, f"{declared.printed_unit}, or %")
     return Demand(name=name, U=size * factor, SA_rad=angle)
@@ -116,18 +116,25 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def _factor(written: str, declared: str) -> float | None:
-    """Return the factor to the declared SI unit; a stiffness is a force or moment per angle, written so."""
+def factor_to(declared: str, written: str) -> float | None:
+    """Return the factor from a written unit to a declared one; None where they are not of one kind.
+
+    A stiffness is a force or a moment per angle, and no force.
+
+    >>> factor_to("N/rad", "kN/rad"), factor_to("N", "kN/deg"), factor_to("lbf", "lbf")
+    (1000.0, None, 1.0)
+    """
     wanted, parts = declared.split("/"), written.split("/")
     if len(wanted) != len(parts):
         return None
     try:
-        units = [unit(part.strip()) for part in parts]
+        pairs = [(unit(a.strip()), unit(b)) for a, b in zip(parts, wanted, strict=True)]
     except UnitError:
         return None
-    if [part.dimension for part in units] != [unit(part).dimension for part in wanted]:
+    if any(a.dimension != b.dimension or a.offset for a, b in pairs):
         return None
-    return units[0].factor / (units[1].factor if len(units) > 1 else 1.0)
+    over, *under = (a.factor / b.factor for a, b in pairs)
+    return over / math.prod(under)
 
 
 def _wrong(what: str, got: str, expected: str, hint: str = "") -> ConfigError:

@@ -73,10 +73,12 @@ def class_of(diagnosis: Diagnosis, where: object) -> DiagnosedEffect:
     return effect
 
 
-def members_of(problem: Problem, diagnosis: Diagnosis, effect: DiagnosedEffect) -> tuple[Member, ...]:
+def members_of(
+    problem: Problem, effects: Sequence[DiagnosedEffect], effect: DiagnosedEffect
+) -> tuple[Member, ...]:
     """Return the members of an effect's class that can be fitted, the likeliest first.
 
-    The other effects of the answer stay beside each.
+    The other ``effects`` of the answer stay beside each.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def members_of(problem: Problem, diagnosis: Diagnosis, effect: DiagnosedEffect) 
     listed = [candidate for candidate in candidates(problem) if candidate.active.runs is None]
     others = tuple(
         _at_answer(candidate, found)
-        for found in diagnosis.effects
+        for found in effects
         if found is not effect
         for candidate in listed
         if candidate.key[:3] == found.key[:3]

@@ -73,9 +73,10 @@ class RunSearch:
     limits: RunLimits
     until: Callable[[], bool] = lambda: True
     learn: Callable[[Sequence[Run]], None] = lambda _runs: None
-    judged: dict[Change, float] = field(default_factory=dict)
+    judged: dict[Run, float] = field(default_factory=dict)
     runs: dict[Change, Run | None] = field(default_factory=dict)
     dense: dict[Run, tuple[Run, Run]] = field(default_factory=dict)
+    _alike: dict[Any, Run] = field(default_factory=dict)
 
     def best(self) -> Change:
         """Return the change of a recording that parts the members furthest."""
@@ -88,20 +89,55 @@ class RunSearch:
         return exchanged(start, self._alternatives, lambda: factors, sweeps=_ROUNDS)
 
     def _alternatives(self, change: Change, factor: int) -> Alternatives[Change]:
-        alternatives = self.factors(change)[factor]
-        if self.judged.get(change, 0.0) >= _ENOUGH:
-            alternatives = ()  # nothing can be won
-        changes = (change, *alternatives)
-        runs = [self._run(new) for new in changes if new not in self.judged]
+        changes = (change, *self.factors(change)[factor])
+        present = self._run(change)
+        if present is not None and self.judged.get(present, 0.0) >= _ENOUGH:
+            changes = (change,)  # nothing can be won
+        runs = [self._run(new) for new in changes]
+        fresh = [run for run in dict.fromkeys(runs) if run is not None and run not in self.judged]
         if self.until() or not self.judged:
-            self._learn(runs)
-        losses = np.array([-self.value(alternative) for alternative in changes])
+            self._learn(fresh)
+        self._judge_all(fresh)
+        losses = np.array([math.inf if run is None else -self.judged.get(run, -math.inf) for run in runs])
         return Alternatives(losses=losses, present=0, design=lambda place: changes[place])
 
+    def _judge_all(self, runs: Iterable[Run]) -> None:
+        """Judge runs by the expected log-evidence of all pairs, each up to certainty; -inf where none can be.
+
+        What rows leave open, and whether derivatives hold, only lowers it: the most promising runs are asked
+        for it first, and those that are no better without than the best are not asked.
+        """
+        rough: dict[Run, tuple[float, tuple[Predicted, ...]]] = {}
+        for run in runs:
+            if (self.judged or rough) and not self.until():
+                break
+            predictions = self._predictions(run)
+            worth = -math.inf if predictions is None else self._worth(run, predictions)
+            if predictions is None or worth < _ENOUGH:
+                rough[run] = worth, predictions or ()
+                continue
+            self.judged[run] = self._worth_completed(run, predictions)
+            if self.judged[run] >= _ENOUGH:
+                return  # of runs that are certain the first counts
+        best = max(self.judged.values(), default=-math.inf)
+        for run, (worth, predictions) in sorted(rough.items(), key=lambda entry: -entry[1][0]):
+            if is_less(-worth, -best):
+                if self.judged and not self.until():
+                    break
+                worth = self._worth_completed(run, predictions)
+            self.judged[run] = worth
+            best = max(best, worth)
+
     def _run(self, change: Change) -> Run | None:
+        """Return the changed run; of changes that come to the same inputs the first one's."""
         if change not in self.runs:
-            run = self.runs[change] = changed(self.problem, change, self.limits)
-            if run is not None and self.problem.case.has_time and run.rows > 2:
+            run = changed(self.problem, change, self.limits)
+            if run is not None:
+                columns = ((name, column.tobytes()) for name, column in run.columns.items())
+                told = repr((sorted(run.conditions.items()), sorted(run.declared.items())))
+                run = self._alike.setdefault((told, run.t.tobytes(), *columns), run)
+            self.runs[change] = run
+            if run is not None and run not in self.dense and self.problem.case.has_time and run.rows > 2:
                 self.dense[run] = denser(run, [channel.name for channel in self.problem.case.drivers])
         return self.runs[change]
 
@@ -109,23 +145,8 @@ class RunSearch:
         known = [run for run in runs if run is not None]
         self.learn([*known, *(dense for run in known for dense in self.dense.get(run, ()))])
 
-    def value(self, change: Change) -> float:
-        """Return the expected log-evidence of all pairs, each up to certainty; -inf where a run cannot be."""
-        if change not in self.judged:
-            self.judged[change] = self._value(change) if self.until() or not self.judged else -math.inf
-        return self.judged[change]
-
-    def _value(self, change: Change) -> float:
-        run = self._run(change)
-        predictions = None if run is None else self._predictions(run)
-        if run is None or predictions is None:
-            return -math.inf
-        worth = self._worth(run, predictions)
-        # What rows leave open, and whether derivatives hold, only lowers it: of a run that is no better
-        # without, nobody asks.
-        if not is_less(-worth, -max(self.judged.values(), default=-math.inf)):
-            return worth
-        predictions = self._completed(run, predictions)
+    def _worth_completed(self, run: Run, rough: Sequence[Predicted]) -> float:
+        predictions = self._completed(run, rough)
         return -math.inf if predictions is None else self._worth(run, predictions)
 
     def _worth(self, run: Run, predictions: Sequence[Predicted]) -> float:

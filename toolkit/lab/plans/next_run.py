@@ -112,7 +112,7 @@ def plan_next(
         problem = problem_of(read, model_of(read, registry, code))
         reach = _limits(limits, rates, read)
         tell("the members of the class")
-        members = members_of(problem, diagnosis, effect)
+        members = members_of(problem, diagnosis.effects, effect)
         tell("runs")
         ends = search_ends(begun, time.monotonic(), budget_s)
         search = RunSearch(

@@ -67,7 +67,7 @@ def interval_plan_answer(
 
     if not LEAST <= reliability < 1:
         raise _wrong("--reliability", reliability, f"a share from {LEAST:g} to below 1, such as 0.95")
-    if tests_a_year is not None and not (math.isfinite(tests_a_year) and tests_a_year >= 0):
+    if tests_a_year is not None and tests_a_year < 0:
         raise _wrong("--tests", tests_a_year, "tests a year, 0 or more")
     due = due_of(registry, instrument, registry.today())
     if load is not None:

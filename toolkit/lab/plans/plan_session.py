@@ -97,7 +97,7 @@ def session_plan_answer(registry: Registry, order: PlanOrder) -> tuple[PlanSessi
 
     if order.out is not None:
         _refuse_filled(order.out)
-    if order.minutes is not None and not (math.isfinite(order.minutes) and order.minutes > 0):
+    if order.minutes is not None and not order.minutes > 0:
         raise _wrong("a time cannot be used", "--minutes", order.minutes, "minutes above 0")
     record, loads, check, text, notes = _basis(registry, order)
     demands = [_demand(record, entry) for entry in order.demands]
@@ -196,7 +196,7 @@ def _basis(
 
 def _demand(record: CalibrationRecord, text: str) -> tuple[str, float, float | None]:
     """Read ``FY=20 N`` or ``FY=20 N at 4 kN`` into the load, U and the load of it, in the record's unit."""
-    from toolkit.units import si_scale, unit
+    from toolkit.planning.demands import factor_to
 
     match = _DEMAND.fullmatch(text)
     names = [fit.load for fit in record.loads]
@@ -209,11 +209,13 @@ def _demand(record: CalibrationRecord, text: str) -> tuple[str, float, float | N
             f'{record.loads[0].unit}", of {", ".join(names)}',
         )
     fit = record.load(match[1])
-    own = unit(fit.unit)
 
     def in_own(number: str, name: str) -> float:
+        factor = factor_to(fit.unit, name)
+        if factor is None:
+            raise _wrong("a demand has no unit that fits", "--u", text, f"{fit.unit}, or one like it")
         try:
-            return float(number) * si_scale(name, own.dimension, where=f"--u {text}") / own.factor
+            return float(number) * factor
         except ValueError:
             return math.nan
 

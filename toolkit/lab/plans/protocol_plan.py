@@ -96,7 +96,7 @@ def plan_test(
     labels = [demand.label for demand in demands]
     _refuse_doubled(labels, where="--u", what="a characteristic has two demands")
     _refuse_doubled([str(like) for like in order.like], where="--like", what="a tire is named twice")
-    _refuse_endless(order)
+    _refuse_without_room(order)
     _refuse_before_a_test(order, demands)
     tell("the earlier test")
     tires, like, tire = _tires(order, spread)
@@ -130,15 +130,13 @@ def _refuse_doubled(labels: Sequence[str], where: str, what: str) -> None:
         )  # fmt: skip
 
 
-def _refuse_endless(order: ProtocolOrder) -> None:
+def _refuse_without_room(order: ProtocolOrder) -> None:
     limits = {
         "--minutes": (order.minutes, "minutes above 0"),
         "--sliding": (order.sliding_kJ, "kJ above 0"),
         "--rise": (order.rise_K, "kelvins above 0"),
     }
     wrong = {name: stated for name, stated in limits.items() if not stated[0] > 0}
-    if order.between_files_s is not None and not 0 <= order.between_files_s < math.inf:
-        wrong["--between-files"] = (order.between_files_s, "seconds, zero or more")
     for name, (size, expected) in wrong.items():
         raise ConfigError(
             "a limit is no number that a test can keep", where=name, got=size, expected=expected,
