@@ -345,6 +345,65 @@ def test_marks_stand_in_a_template_that_forgot_them(tmp_path: Path) -> None:
     assert filled(tmp_path, p("{{tk:simulated}} {{tk:calibration.status}}"), made).marks_added == ()
 
 
+def _of_pages(kind: str):
+    """Make the header of a template one of the first or of the even pages, which it does not tell apart."""
+
+    def edit(members: dict[str, bytes]) -> None:
+        text = members["word/document.xml"]
+        members["word/document.xml"] = text.replace(b'w:type="default"', f'w:type="{kind}"'.encode())
+
+    return edit
+
+
+MARKS = p("{{tk:simulated}} {{tk:calibration.status}} {{tk:signature}}")
+
+
+@pytest.mark.parametrize(
+    ("body", "more"),
+    [
+        (sdt("tk:if.relaxation_length", MARKS), {}),
+        (sdt("tk:if.simulated", p()) + sdt("tk:if.unverified", p(" ")), {}),
+        (p("x"), {"header": MARKS, "edit": _of_pages("first")}),
+        (p("x"), {"header": MARKS, "edit": _of_pages("even")}),
+    ],
+    ids=[
+        "a condition that does not hold",
+        "conditions without words",
+        "first page's header",
+        "even pages' header",
+    ],
+)
+def test_marks_stand_in_a_template_that_does_not_print_their_places(tmp_path, body, more) -> None:
+    # Neither titlePg nor evenAndOddHeaders is set (ISO/IEC 29500-1, 17.10.1 and 17.10.6).
+    result = filled(tmp_path, body, content(simulated=True, unverified=True), **more)
+    assert set(result.marks_added) == {"simulated", "unverified"}
+    assert texts(result.docx).startswith("SIMULATED DATA")
+    assert "Signature: " in texts(result.docx)
+
+
+def test_a_mark_in_the_header_of_even_pages_stands_in_the_body_too(tmp_path: Path) -> None:
+    # A report of one page has none.
+    def edit(members: dict[str, bytes]) -> None:
+        _of_pages("even")(members)
+        settings = members["word/settings.xml"]
+        at = settings.index(b">", settings.index(b"<w:settings")) + 1
+        members["word/settings.xml"] = settings[:at] + b"<w:evenAndOddHeaders/>" + settings[at:]
+
+    result = filled(tmp_path, p("x"), content(simulated=True), header=MARKS, edit=edit)
+    assert result.marks_added == ("simulated",)
+
+
+def test_a_mark_in_the_header_of_the_first_page_is_enough(tmp_path: Path) -> None:
+    def edit(members: dict[str, bytes]) -> None:
+        _of_pages("first")(members)
+        text = members["word/document.xml"]
+        members["word/document.xml"] = text.replace(b"</w:sectPr>", b"<w:titlePg/></w:sectPr>")
+
+    result = filled(tmp_path, p("x"), content(simulated=True), header=MARKS, edit=edit)
+    assert result.marks_added == ()
+    assert result.perhaps_shown == ()
+
+
 def test_document_properties(tmp_path: Path) -> None:
     core = docx.Document(io.BytesIO(filled(tmp_path, p("x")).docx)).core_properties
     assert core.created == core.modified == dt.datetime(2026, 11, 21, tzinfo=dt.UTC)

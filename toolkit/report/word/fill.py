@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -37,7 +37,7 @@ from toolkit.report.word.package import Template, open_package, undated
 from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties
 from toolkit.report.word.pictures import Ids, chart_run, free_height, insert_at_mark, picture_run
 from toolkit.report.word.rows import fill_table
-from toolkit.report.word.scan import Site, row_in, scan, table_of
+from toolkit.report.word.scan import Site, row_in, scan, table_of, visible_texts
 from toolkit.report.word.toc import write_contents
 from toolkit.report.word.xml import (
     W_P,
@@ -158,11 +158,18 @@ class _Filler:
         self.printed = kept_whole if from_the_right(package, parts) else str
 
     def run(self, lint: tuple[LintFinding, ...]) -> Filled:
-        paths = {site.tag.path for site in scan(self.parts)}
+        places = scan(self.parts)
+        witnesses = [_witness(site) for site in places]
         body = self.parts[0].root
         self._conditions()
         drop_notes(self.parts)
         never, perhaps = headers_shown(self.package, self.parts)
+        unsure = {*never, *(name for name, _ in perhaps)}
+        paths = {
+            site.tag.path
+            for site, witness in zip(places, witnesses, strict=True)
+            if site.story.name not in unsure and _stands(witness, site.story)
+        }
         sites = scan(self.parts)
         self._demand(sites)
         # Everything is located before anything is written: a value that reads like a tag stays a value.
@@ -395,6 +402,25 @@ class _Filler:
             self.log.manifest.append(Entry(tag=f"mark:{name}", text=text, part=self.parts[0].name))
             added.append(name)
         return tuple(added)
+
+
+def _witness(site: Site) -> Element | None:
+    """Return what must still stand in the filled document for a place to be printed; None for no place.
+
+    A condition is a place by the words within it: its control goes.
+    """
+    if site.fallback:
+        return None
+    return site.element if site.tag.family != "if" else next(_words_in(site.element), None)
+
+
+def _words_in(control: Element) -> Iterator[Element]:
+    texts = (text for paragraph in control.iter(W_P) for text in visible_texts(paragraph))
+    return (text for text in texts if (text.text or "").strip())
+
+
+def _stands(witness: Element | None, story: Story) -> bool:
+    return witness is not None and any(element is story.root for element in witness.iterancestors())
 
 
 def _prototypes(table: Element | None, sites: list[Site]) -> list[Element]:

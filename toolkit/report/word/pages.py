@@ -38,15 +38,17 @@ def headers_shown(
     certain: set[str] = set()
     possible: set[str] = set()
     title_somewhere = any(switched_on(section, "w:titlePg") for section in sections)
-    for section in sections:
+    for number, section in enumerate(sections):
         for reference in section.iter(q("w:headerReference"), q("w:footerReference")):
             rel = main.rels.get(reference.get(q("r:id")))
             if rel is None or rel.is_external:
                 continue
             name = str(rel.target_part.partname).lstrip("/")
             kind = reference.get(q("w:type")) or "default"
-            # A later section may show the first page's header of the one before.
-            if kind == "default" and not even and not switched_on(section, "w:titlePg"):
+            title = switched_on(section, "w:titlePg")
+            # Every document has a first page. A later section may show the first page's header of the one
+            # before.
+            if (kind == "default" and not even and not title) or (kind == "first" and title and number == 0):
                 certain.add(name)
             elif kind == "default" or (kind == "first" and title_somewhere) or (kind == "even" and even):
                 possible.add(name)
