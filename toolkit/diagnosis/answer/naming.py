@@ -57,7 +57,8 @@ def imitates(search: Search) -> bool:
         return False
     if implausible(search) and not _takes_nearly_all(search):
         return True
-    if (not _taken(search) and _is_smooth(search)) or _is_within_accuracy(search):
+    shows = _taken(search) or _takes_more_than_is_left(search)
+    if (not shows and _is_smooth(search)) or _is_within_accuracy(search):
         return True
     # A rest that no test tells from anything (its gain is none) is no evidence that a size imitates it.
     told = any(structure.gain > 0 for structure in search.structure) and not cut_short(search.skipped)
@@ -188,16 +189,16 @@ def _takes_more_than_is_left(search: Search) -> bool:
     """Tell whether effects take more of an output's unseen rows than they leave there.
 
     A coloured noise weighs slow errors little, however large they are. About every run's own mean: whatever
-    is left out has one, and some zero takes it.
+    is left out has one, and some zero takes it. Of an output that only drifts, of its rates or of itself: over
+    few rows rates are the sensor's noise.
     """
-    problem = search.problem
+    problem, held = search.problem, (search.held_refitted, search.held_augmented)
     for name in problem.names:
-        before, after = (
-            _within_runs(problem, name, problem.observed[name] - held.simulated[name])
-            for held in (search.held_refitted, search.held_augmented)
-        )
-        if before - after > after:
-            return True
+        errors = [problem.observed[name] - each.simulated[name] for each in held]
+        judged = [_within_runs, *([_about_means] if name in problem.rates else ())]
+        for before, after in ([of(problem, name, error) for error in errors] for of in judged):
+            if before - after > after:
+                return True
     return False
 
 
@@ -214,6 +215,10 @@ def _within_runs(problem: Problem, name: str, error: Array) -> float:
     """Return the mean square of an error about its mean in every run; rates have no zero that moves."""
     if name in problem.rates:
         return float(np.mean(problem.judged(name, error) ** 2))
+    return _about_means(problem, name, error)
+
+
+def _about_means(problem: Problem, name: str, error: Array) -> float:
     counted = problem.kept[name]
     parts = [error[rows][counted[rows]] for rows in problem.slices if counted[rows].any()]
     return float(np.mean(np.concatenate([part - part.mean() for part in parts]) ** 2))

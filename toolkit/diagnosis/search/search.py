@@ -147,8 +147,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
 
     Rows are weighed by a noise of the rest's colour first: what leaves noise is found so, however small. In a
     rest that no colour makes noise each row foretells the next, and what is right makes corners in it. Where
-    what was found leaves such a rest, it is weighed by its size, and what foretells unseen rows better
-    stands.
+    what was found leaves such a rest, it is weighed by its size, and that stands, unless rows foretell
+    unseen ones far better.
 
     Parameters
     ----------
@@ -176,8 +176,10 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         return found
     by_size = _searched(weighed, folds, nominal, fit(weighed, start=refitted.p), seed, budget)
     if by_size.steps:
-        errors = [unseen_error(problem, each.held_augmented) for each in (found, by_size)]
-        return by_size if not found.steps or errors[1] < errors[0] else found
+        by_rows, left = (unseen_error(problem, each.held_augmented) for each in (found, by_size))
+        # What rows add to it, and takes less than it leaves, imitates the rest.
+        halves = by_rows < left + math.log(1 - STEP.least_behind)
+        return found if found.steps and halves else by_size
     return found if found.steps else replace(found, by_size=by_size)
 
 
