@@ -189,8 +189,8 @@ def _takes_more_than_is_left(search: Search) -> bool:
     """Tell whether effects take more of an output's unseen rows than they leave there.
 
     A coloured noise weighs slow errors little, however large they are. About every run's own mean: whatever
-    is left out has one, and some zero takes it. Of an output that only drifts, of its rates or of itself: over
-    few rows rates are the sensor's noise.
+    is left out has one, and some zero takes it. Of an output that only drifts, of its rates or of itself:
+    over few rows rates are the sensor's noise.
     """
     problem, held = search.problem, (search.held_refitted, search.held_augmented)
     for name in problem.names:

@@ -32,7 +32,7 @@ from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
 from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.bends import at_bound
 from toolkit.diagnosis.search.forward_step import joint_fit
-from toolkit.diagnosis.search.noise_floor import weighed_as_mismatch
+from toolkit.diagnosis.search.noise_floor import may_leave_noise
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
@@ -123,7 +123,7 @@ def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sea
     by_size, problem = search.by_size, search.problem
     if search.steps or by_size is None or not laws.complete:
         return search, laws
-    if laws.listed and not weighed_as_mismatch(by_size.problem, laws.fit, search.refitted).memory:
+    if laws.listed and may_leave_noise(by_size.problem, search.refitted, laws.fit):
         return search, laws
     others = learned(by_size, withdrawn=False, budget=budget)
     errors = [unseen_error(problem, each.held_out) for each in (laws, others)]

@@ -223,8 +223,9 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
     """Return a search and its laws without the effects that the laws made superfluous.
 
     Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
-    dropped where the held-out score of the laws beside refitted parameters is as good without it, or where
-    laws as simple are better in its place and it is the small part of both. One that takes nearly all that
+    dropped where the held-out score of the laws beside refitted parameters is as good without it, where laws
+    as simple are better in its place and it is the small part of both, or where it has another size beside
+    them. One that takes nearly all that
     the laws take in its place keeps its name: they mend its form (a leak of the load into a force, before or
     after the filter).
     """
@@ -279,8 +280,14 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
         bare = fit(problem, listed, start=laws.fit.p)
         scores = hold_out(problem, search.folds, bare.active, bare)
         idle = outdone(search, laws) and all(_is_idle(laws.fit, step) for step in dropped)
+        astray = not any(_holds_beside(laws, step) for step in dropped)
         needed = laws.held_out.total - scores.total >= STEP.least_gain
-        if needed and not idle and not (dropped == search.steps and _is_minor(search, laws, bare, scores)):
+        if (
+            needed
+            and not idle
+            and not astray
+            and not (dropped == search.steps and _is_minor(search, laws, bare, scores))
+        ):
             return None
         steps = tuple(step for step in search.steps if step not in dropped)
         if steps:

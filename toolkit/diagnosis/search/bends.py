@@ -82,7 +82,8 @@ def _is_beyond_sensors(problem: Problem, applied: AppliedEffect) -> bool:
     view = CaseView(problem, applied.channel, applied.source)
     if view.origin(applied.channel) is None:
         return False
-    return applied.is_unusual(view, log_density=PRIORS.within**2 / 2)
+    # A thermometer is off by degrees; a cell's gain may be any that somebody entered.
+    return applied.is_unusual(view, log_density=PRIORS.far**2 / 2)
 
 
 def _curves(fit: Fit) -> Iterator[tuple[AppliedEffect, AppliedEffect]]:

@@ -102,31 +102,28 @@ def beyond_noise(problem: Problem, base: Fit) -> dict[str, ChannelNoise]:
     }
 
 
-def weighed_as_mismatch(problem: Problem, base: Fit, refitted: Fit, *, may_be_noise: bool = False) -> Problem:
+def weighed_as_mismatch(problem: Problem, base: Fit, *, may_be_noise: bool = False) -> Problem:
     """Return a problem whose outputs with a rest that is no noise have its memory, and no others one.
 
     Each row of such a rest is foretold by the row before, whatever it is, by less than the corner that what
     is right makes in it: a likelihood of single rows prefers what is smooth to what is true. Its size is what
-    counts, over as many values as its memory leaves independent. Effects that take nearly all of it may leave
-    noise; what less leaves is none for being smaller.
+    counts, over as many values as its memory leaves independent. What was no noise is none for being smaller,
+    until it is the sensor's or matters to nobody.
 
     Parameters
     ----------
-    refitted : the fit without effects
     may_be_noise : a rest may be noise, too, that is above the sensor's and matters
     """
     if not problem.case.has_order:
         return problem
-    memory, beyond = {}, beyond_noise(problem, base)
+    memory, known = {}, {*beyond_noise(problem, base), *problem.memory}
     for name in (each for each in problem.names if problem.kept[each].any() and each not in problem.rates):
-        parts = noise_parts(problem, base, name)
-        known = name in beyond or (
-            name in problem.memory and not _took_nearly_all(problem, base, refitted, name)
-        )
-        known |= may_be_noise and parts.total_sd > VERDICT.accuracy * spread(problem, name)
-        if not known or parts.process_sd <= NOISE.mismatch * parts.sensor_sd:
+        parts, where = noise_parts(problem, base, name), problem.layout(name)
+        matters = parts.total_sd > VERDICT.accuracy * spread(problem, name)
+        if not (matters and (may_be_noise or name in known)):
             continue
-        where = problem.layout(name)
+        if parts.process_sd <= NOISE.mismatch * parts.sensor_sd:
+            continue
         noise = fit_noise(base.residual[name][where.index], where, floor=problem.floor[name])
         # Runs are independent, whatever stays the same in each of them.
         own = float(np.median([problem.kept[name][rows].sum() for rows in problem.slices]))
@@ -136,10 +133,21 @@ def weighed_as_mismatch(problem: Problem, base: Fit, refitted: Fit, *, may_be_no
     return replace(problem, memory=memory)
 
 
-def _took_nearly_all(problem: Problem, base: Fit, refitted: Fit, name: str) -> bool:
-    kept = problem.kept[name]
-    before, after = (float(np.mean(made.residual[name][kept] ** 2)) for made in (refitted, base))
-    return after < (1 - VERDICT.nearly) * before
+def may_leave_noise(problem: Problem, refitted: Fit, made: Fit) -> bool:
+    """Tell whether effects took nearly all of what was no noise: some colour may make noise of the rest.
+
+    Parameters
+    ----------
+    problem : with the memory of what was no noise beside the refit
+    refitted, made : the fits without effects, and with them
+    """
+    beyond = beyond_noise(problem, made)
+    for name in problem.memory:
+        kept = problem.kept[name]
+        before, after = (float(np.mean(each.residual[name][kept] ** 2)) for each in (refitted, made))
+        if name in beyond or after > (1 - VERDICT.nearly) * before:
+            return False
+    return True
 
 
 def _is_large(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bool:

@@ -28,7 +28,7 @@ from toolkit.diagnosis.search.channel_factors import leaves_noise, with_units_ju
 from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, step_groups
 from toolkit.diagnosis.search.in_place import foretold_best
 from toolkit.diagnosis.search.lattice import lattice_of
-from toolkit.diagnosis.search.noise_floor import hidden_in_noise, weighed_as_mismatch
+from toolkit.diagnosis.search.noise_floor import hidden_in_noise, may_leave_noise, weighed_as_mismatch
 from toolkit.diagnosis.search.pairs import best_pair
 from toolkit.diagnosis.search.proposals import NONE, proposals
 from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
@@ -166,12 +166,11 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         refitted = fit(problem, start=refitted.p)
     folds = folds_of(problem, refitted)
     found = _searched(problem, folds, nominal, refitted, seed, budget)
-    weighed = weighed_as_mismatch(problem, refitted, refitted)
-    leaves_noise = not weighed_as_mismatch(weighed, found.augmented, refitted).memory
-    if found.skipped or (found.steps and leaves_noise):
+    weighed = weighed_as_mismatch(problem, refitted)
+    if found.skipped or (found.steps and may_leave_noise(weighed, refitted, found.augmented)):
         return found
     if not weighed.memory:
-        weighed = weighed_as_mismatch(problem, refitted, refitted, may_be_noise=True)
+        weighed = weighed_as_mismatch(problem, refitted, may_be_noise=True)
     if not weighed.memory:
         return found
     by_size = _searched(weighed, folds, nominal, fit(weighed, start=refitted.p), seed, budget)
@@ -205,7 +204,7 @@ def _searched(
         for turn in range(STEP.most_effects + 1):
             base, steps = with_a_size(problem, base, steps)
             if problem.memory and steps:
-                problem = weighed_as_mismatch(problem, base, refitted)
+                problem = weighed_as_mismatch(problem, base)
                 refitted = fit(problem, start=refitted.p)
                 base = fit(problem, base.active, start=base.p)
                 held_refitted = hold_out(problem, folds, (), refitted)
