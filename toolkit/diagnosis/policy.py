@@ -426,6 +426,7 @@ class _Laws:
         0.5, "of its size", "by which an effect may be smaller or larger beside laws and be the same effect"
     )
     itself: float = _set(0.05, "of an output's variance", "what a second record of it is off by")
+    steady: float = _set(0.01, "of a rate", "by which it may vary and be one number")
     moved: float = _set(1.0, "prior sd", "a parameter that goes farther is what the law may be taken for")
     points: int = _set(41, "points of a curve", "that is drawn of a law over what was recorded")
     step: float = _set(1e-4, "of a parameter", "by which the band of a curve is differentiated")

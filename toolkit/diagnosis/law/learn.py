@@ -270,13 +270,16 @@ def _fitted(
 
 
 def _simplest_first(fitted: Sequence[tuple[float, Trial, Fit]]) -> list[tuple[float, Trial, Fit]]:
-    """Return fits in order, of those that the data do not tell from the best one the simplest first."""
+    """Return fits in order, of those that the data do not tell from the best one the simplest first.
+
+    Of laws that are one on the rows that were recorded the shortest is it.
+    """
     best = max((score for score, _, _ in fitted), default=0.0)
 
-    def order(entry: tuple[float, Trial, Fit]) -> tuple[bool, int, float]:
+    def order(entry: tuple[float, Trial, Fit]) -> tuple[bool, int, float, int]:
         score, trial, _ = entry
         behind = score <= best - VERDICT.close
-        return behind, 0 if behind else trial.cost, -score
+        return behind, 0 if behind else trial.cost, -round(score, 3), len(trial.applied.effect.name)
 
     return sorted(fitted, key=order)
 

@@ -216,11 +216,16 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
                 for run, rows in zip(problem.runs, problem.slices, strict=True)
             ]
             rate, per_second = np.concatenate(rates), f"{bracketed(text)}/s"
-            listed.append(
-                Signal(
-                    written=f"rate([{name}])", name=f"d{of}/dt", unit=per_second, values=rate, steady=False
+            if not _is_one_number(rate):
+                listed.append(
+                    Signal(
+                        written=f"rate([{name}])",
+                        name=f"d{of}/dt",
+                        unit=per_second,
+                        values=rate,
+                        steady=False,
+                    )
                 )
-            )
 
     for channel in case.drivers:
         if all(channel.name in run.columns for run in problem.runs):
@@ -240,6 +245,12 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
         for each in listed
         if each not in records
     )
+
+
+def _is_one_number(rate: Array) -> bool:
+    """Tell whether a rate never varied, but for a run's ends: a memory of it is a curve of the time."""
+    low, usual, high = np.percentile(rate, [1, 50, 99])
+    return bool(high - low <= LAWS.steady * abs(usual))
 
 
 def _is_record_of(problem: Problem, output: str, signal: Signal) -> bool:
