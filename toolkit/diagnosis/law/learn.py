@@ -118,10 +118,11 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
 def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
     """Return a search without effects and its laws, by the rest's size where these foretell better.
 
-    Asked where the laws that rows show leave what is no noise.
+    Asked where the laws that rows show leave what is no noise; not of equations, whose own noise is coloured.
     """
     by_size, problem = search.by_size, search.problem
-    if search.steps or by_size is None or not laws.complete:
+    motion = problem.model.capability.motion
+    if search.steps or by_size is None or not laws.complete or (motion is not None and motion.integrates):
         return search, laws
     if laws.listed and may_leave_noise(by_size.problem, search.refitted, laws.fit):
         return search, laws

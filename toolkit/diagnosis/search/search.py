@@ -281,8 +281,9 @@ def _searched(
                 if not _is_nuisance(step, steps):
                     steps.append(step)
                 continue
-            # Of a residual without structure no two effects explain what no single one does.
-            if not structure or turn + 2 > STEP.most_effects:
+            # Of a residual without structure no two effects explain what no single one does. By size none are
+            # asked that rows have not shown.
+            if not structure or problem.memory or turn + 2 > STEP.most_effects:
                 break
             both = None
             try:
