@@ -117,7 +117,7 @@ def plan_session(knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) 
         ``plan-infeasible``: no plan keeps the demand; the message has the nearest one
         ``plan-fixtures``: the feasible loads cannot tell the coefficients
     """
-    search = SessionSearch(knowledge, feasible, demand)
+    search = SessionSearch(knowledge, feasible.few(), demand)
     return _Finished(search).plan(search.best())
 
 
@@ -256,6 +256,9 @@ class _Finished:
             lines.append(f"{fewer} readings fewer than {self.knowledge.record.id}: an outlier weighs more")
         if self.feasible.refused:
             lines.append(f"{self.feasible.refused} loads of the fixtures, each beyond a limit")
+        if self.feasible.mounts_left_out:
+            count = self.feasible.mounts_left_out
+            lines.append(f"{count} mounts of the fixtures, much like those that were weighed")
         if wider:
             lines.append(f"U is wider than by the last session's loads: {', '.join(wider)}")
         return tuple(lines)
