@@ -247,8 +247,7 @@ class _Finished:
             lines.append(f"no misfit of the equation of {blind} can be seen: the loads have too few levels")
         lines += self._fewer_points(design)
         lines += [
-            f"loads beyond {reach.low:.5g} to {reach.high:.5g} {reach.unit} of {reach.load}: "
-            "the next record's range ends there"
+            f"loads beyond {reach.text} of {reach.load}: the next record's range ends there"
             for reach in self.search.reach
             if reach.short
         ]
@@ -293,10 +292,8 @@ class _Finished:
         findings += [
             Finding(
                 rule="plan-range", where=f"{record.id}, {reach.load}",
-                message=f"{reach.load} is loaded from {reach.low:.5g} to {reach.high:.5g} {reach.unit}, "
-                f"where {record.id} is calibrated from "
-                f"{reach.calibrated[0]:.5g} to {reach.calibrated[1]:.5g} {reach.unit}: the next record gives "
-                "no U beyond what is loaded",
+                message=f"{reach.load} is loaded from {reach.text}, where {record.id} is calibrated from "
+                f"{reach.calibrated_text}: the next record gives no U beyond what is loaded",
             )
             for reach in self.search.reach
             if reach.short
