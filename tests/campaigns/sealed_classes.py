@@ -49,6 +49,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
 from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.search.between_rows import differences
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ToolkitError
 from toolkit.planning.drives import fastest
@@ -203,11 +204,24 @@ def fitted_again(more: Problem, members: tuple[Member, ...]) -> tuple[Member, ..
     return tuple(sorted(again, key=lambda member: -member.fit.log_posterior))
 
 
-def named(members: tuple[Member, ...]) -> str | None:
-    """Return the effect of the member that is ahead of all others by what a diagnosis asks for."""
-    first, second = members[:2]
-    ahead = first.fit.log_posterior - second.fit.log_posterior > VERDICT.close
-    return first.fit.active[-1].effect.name if ahead else None
+def named(more: Problem, members: tuple[Member, ...]) -> str | None:
+    """Return the effect of the member that is ahead of all others by what a diagnosis asks for.
+
+    Also whatever is assumed between the rows, where both read a simulation there.
+    """
+    first, *others = members
+    *beside, chosen = first.fit.active
+    behind = {
+        other.label: other.fit.active[-1]
+        for other in others
+        if other.fit.active[-1].effect.reads_between_rows
+    }
+    shown = differences(more, tuple(beside), chosen, behind, first.fit.p)
+    ahead = min(
+        -max(other.fit.log_posterior - first.fit.log_posterior, shown.get(other.label, -np.inf))
+        for other in others
+    )
+    return chosen.effect.name if ahead > VERDICT.close else None
 
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,6 +236,11 @@ class Outcome:
     named: dict[str, str | None]
     steps: str
     seconds: float
+
+    @property
+    def parts(self) -> bool:
+        """Tell whether it parts any pair; of a run that parts none the command ends with exit code 2."""
+        return len(self.together) < len(self.members) * (len(self.members) - 1) // 2
 
 
 def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) -> Outcome | str:
@@ -258,7 +277,7 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
         assert run is not None
         more = with_run(drawn, run, change.run, folder / label, rng)
         try:
-            names[label] = named(fitted_again(more, members))
+            names[label] = named(more, fitted_again(more, members))
         except ToolkitError:
             names[label] = None
     return Outcome(
@@ -336,7 +355,9 @@ def main() -> None:
             sys.stdout.write(f"  {dataclasses.asdict(outcome)}\n")
         sys.stdout.flush()
     sure = [row for row in rows if row.power > PROMISED]
-    sys.stdout.write(f"{table(rows)}\npromised over {PROMISED:g}:\n{table(sure)}\n")
+    answered = [row for row in rows if row.parts]
+    sys.stdout.write(f"{table(rows)}\nwhere the command proposes a run:\n{table(answered)}\n")
+    sys.stdout.write(f"promised over {PROMISED:g}:\n{table(sure)}\n")
     sys.stdout.write(f"not counted: {dict(uncounted)}\n")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from toolkit.declared import read
+from toolkit.declared.text import read_text
 from toolkit.errors import ConfigError
 from toolkit.machine.hub import LoadingFixtures
 from toolkit.planning.fixtures import FeasibleLoads, loads_of_fixtures
@@ -108,3 +109,28 @@ def test_a_load_far_beyond_what_was_put_on_is_left_out(tmp_path: Path, knowledge
 def test_a_load_of_zero_has_no_sign(tmp_path: Path, knowledge: Knowledge) -> None:
     loads = made(tmp_path, knowledge).loads
     assert not np.signbit(loads[loads == 0]).any()
+
+
+def test_of_thousands_of_fixtures_a_search_weighs_those_that_differ(knowledge: Knowledge) -> None:
+    """Every force comes twice, slowly first: the largest of both senses stay, and the quick ones."""
+    stated = "".join(
+        f'''[[fixture]]
+name = "{name} {force}"
+per_newton = {{ FY = 1.0 }}
+weights = {{ value = [{force}], unit = "N" }}
+minutes = {minutes}
+'''
+        for force in range(1000, 3000)
+        for name, minutes in (("slow", 9), ("quick", 2))
+    )
+    stated = 'instrument = "m15-virtual"\n' + stated
+    read_in = read_text(LoadingFixtures, stated.encode(), where="fixtures.toml")
+    every = loads_of_fixtures(read_in, knowledge.record, "fixtures.toml")
+    few = every.few()
+    assert 500 < len(few.mount) <= 600
+    assert few.mounts_left_out == len({*every.mount}) - len({*few.mount})
+    assert {*few.loads[:, 0]} >= {every.loads[:, 0].min(), every.loads[:, 0].max(), 0.0}
+    assert not [mount for mount in few.mount if mount.startswith("slow")]
+    steps = np.diff(np.sort(few.loads[few.loads[:, 0] > 0, 0]))
+    assert steps.max() < 2.5 * np.median(steps)
+    assert few.few() is few

@@ -86,7 +86,7 @@ def parse_demand(text: str) -> Demand:
     match = _FORM.fullmatch(text)
     size = _number(match["size"]) if match and match["size"] is not None else 1.0
     if match is None or not (math.isfinite(size) and size > 0):
-        raise _wrong("a demand cannot be read", text, "NAME=NUMBER UNIT: 'conicity=5 N', 'peak=1 %'")
+        raise _wrong("a demand cannot be read", text, "NAME=NUMBER UNIT, above 0: 'conicity=5 N', 'peak=1 %'")
     name, written = match["name"], match["unit"]
     known = (PEAK, *by_name())
     if name not in known:

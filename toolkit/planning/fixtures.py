@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from toolkit.machine.hub import Loading
 
 _NONE: Mapping[str, float] = MappingProxyType({})
+_MOST = 600  # loads that a search weighs within its minute
 _BEYOND = 1.1  # of the largest load that was put on: further the record says nothing of the cells
 
 
@@ -35,7 +37,7 @@ class FeasibleLoads:
     ``loads`` (candidates, loads) in the record's units; ``mount`` (candidates,) names the fixture and its
     way, "" of the empty hub; ``amount`` (candidates,) orders the loads of a mount by size, ``label`` says
     them. ``minutes`` (candidates,) and ``setup_minutes`` are None where nobody stated them; ``refused``
-    loads of the fixtures were beyond a limit.
+    loads of the fixtures were beyond a limit, and so many ``mounts_left_out`` are much like others (`few`).
     """
 
     source: str
@@ -47,6 +49,43 @@ class FeasibleLoads:
     setup_minutes: Mapping[str, float] | None
     run_minutes: float | None
     refused: int = 0
+    mounts_left_out: int = 0
+
+    def few(self) -> FeasibleLoads:
+        """Return the loads of as many mounts as a search has time for.
+
+        Those of the largest loads of each kind and sense, then always the one whose largest load is farthest
+        from those of all others; of alike ones the quickest.
+        """
+        if len(self.mount) <= _MOST:
+            return self
+        numbers, mount_of = np.unique(np.array(self.mount), return_inverse=True)
+        count = np.bincount(mount_of)
+        tops = np.zeros((len(numbers), self.loads.shape[1]))
+        order = np.argsort(self.amount, kind="stable")
+        tops[mount_of[order]] = self.loads[order]  # the last, which is the largest, stays
+        tops /= np.maximum(np.abs(self.loads).max(axis=0), 1e-300)
+        slow = np.zeros(len(numbers))
+        if self.minutes is not None and self.setup_minutes is not None:
+            slow[mount_of] = self.minutes
+            slow += [self.setup_minutes.get(name, 0.0) for name in numbers.tolist()]
+        quickest = np.argsort(slow, kind="stable")
+        ends = np.concatenate([tops[quickest], -tops[quickest]], axis=1).argmax(axis=0)
+        chosen = dict.fromkeys([int(np.flatnonzero(numbers == "")[0]), *quickest[ends].tolist()])
+        apart = np.min([np.linalg.norm(tops - tops[at], axis=1) for at in chosen], axis=0)
+        while apart.max() > 0:
+            at = int(quickest[np.argmax(apart[quickest])])
+            if count[[*chosen, at]].sum() > _MOST:
+                break
+            chosen[at] = None
+            apart = np.minimum(apart, np.linalg.norm(tops - tops[at], axis=1))
+        kept = np.flatnonzero(np.isin(mount_of, [*chosen])).tolist()
+        return dataclasses.replace(
+            self, loads=self.loads[kept], mount=tuple(self.mount[at] for at in kept),
+            label=tuple(self.label[at] for at in kept), amount=self.amount[kept],
+            minutes=None if self.minutes is None else self.minutes[kept],
+            mounts_left_out=len(numbers) - len(chosen),
+        )  # fmt: skip
 
     def unloadable(self) -> NDArray[np.intp]:
         """Return the loads that can be reached from above: the empty hub, all below the top of a mount."""

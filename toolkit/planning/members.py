@@ -300,14 +300,15 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
     identity). Each fit has taken what it does not explain for noise: the noise counts under which the two
     are less apart. What rows leave open by either is open to both. But a fit of the run takes simulations at
     their rows for the truth: by what inputs that go straight between rows make of it, it is misled. And what
-    the true member's own fit may miss is not to be expected.
+    the true member's own fit may miss is not to be expected, nor what the other one's may find: where
+    derivatives do not say what its parameters change, it may come nearer than they say.
 
     Parameters
     ----------
     members : those of the two predictions
     """
     expected = min(_divergence(run, member.fit.noise, true, rival) for member in members)
-    return max(expected - true.lost, min(expected, 0.0))
+    return max(expected - true.lost - rival.lost, min(expected, 0.0))
 
 
 def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, rival: Predicted) -> float:

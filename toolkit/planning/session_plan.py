@@ -117,7 +117,7 @@ def plan_session(knowledge: Knowledge, feasible: FeasibleLoads, demand: Demand) 
         ``plan-infeasible``: no plan keeps the demand; the message has the nearest one
         ``plan-fixtures``: the feasible loads cannot tell the coefficients
     """
-    search = SessionSearch(knowledge, feasible, demand)
+    search = SessionSearch(knowledge, feasible.few(), demand)
     return _Finished(search).plan(search.best())
 
 
@@ -247,8 +247,7 @@ class _Finished:
             lines.append(f"no misfit of the equation of {blind} can be seen: the loads have too few levels")
         lines += self._fewer_points(design)
         lines += [
-            f"loads beyond {reach.low:.5g} to {reach.high:.5g} {reach.unit} of {reach.load}: "
-            "the next record's range ends there"
+            f"loads beyond {reach.text} of {reach.load}: the next record's range ends there"
             for reach in self.search.reach
             if reach.short
         ]
@@ -256,6 +255,9 @@ class _Finished:
             lines.append(f"{fewer} readings fewer than {self.knowledge.record.id}: an outlier weighs more")
         if self.feasible.refused:
             lines.append(f"{self.feasible.refused} loads of the fixtures, each beyond a limit")
+        if self.feasible.mounts_left_out:
+            count = self.feasible.mounts_left_out
+            lines.append(f"{count} mounts of the fixtures, much like those that were weighed")
         if wider:
             lines.append(f"U is wider than by the last session's loads: {', '.join(wider)}")
         return tuple(lines)
@@ -290,10 +292,8 @@ class _Finished:
         findings += [
             Finding(
                 rule="plan-range", where=f"{record.id}, {reach.load}",
-                message=f"{reach.load} is loaded from {reach.low:.5g} to {reach.high:.5g} {reach.unit}, "
-                f"where {record.id} is calibrated from "
-                f"{reach.calibrated[0]:.5g} to {reach.calibrated[1]:.5g} {reach.unit}: the next record gives "
-                "no U beyond what is loaded",
+                message=f"{reach.load} is loaded from {reach.text}, where {record.id} is calibrated from "
+                f"{reach.calibrated_text}: the next record gives no U beyond what is loaded",
             )
             for reach in self.search.reach
             if reach.short

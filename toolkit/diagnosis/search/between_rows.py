@@ -8,7 +8,7 @@ the likelihood by more than two such effects differ, the assumption has parted t
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.policy import VERDICT
@@ -17,7 +17,11 @@ from toolkit.diagnosis.search.time_budget import BudgetSpentError
 from toolkit.effects.filters import STRAIGHT
 from toolkit.errors import FitError
 
+K = TypeVar("K")
+
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.search.forward_step import Step
     from toolkit.diagnosis.search.search import Search
@@ -26,9 +30,6 @@ if TYPE_CHECKING:
 
 def with_readings_between_rows(search: Search) -> Search:
     """Return a search whose rivals are behind by no more than what is assumed between the rows leaves."""
-    motion = search.problem.model.capability.motion
-    if motion is not None and motion.integrates:  # an equation was solved there
-        return search
     return replace(search, steps=tuple(_read_otherwise(search, step) for step in search.steps))
 
 
@@ -38,24 +39,38 @@ def _read_otherwise(search: Search, step: Step) -> Step:
         for rival in step.rivals
         if rival.difference <= -VERDICT.close and rival.active.effect.reads_between_rows
     }
-    if not behind or not step.active.effect.reads_between_rows:
-        return step
     beside = without(search.augmented.active, step.active)
-    start = search.augmented.p
-    try:
-        chosen = _readings(search.problem, beside, step.active, start)
-        assumed, best = abs(chosen[0] - chosen[1]), max(chosen)
-        levelled = {
-            key: min(0.0, max(_readings(search.problem, beside, rival, start)) - best + assumed)
-            for key, rival in behind.items()
-        }
-    except (FitError, BudgetSpentError):  # it does not run with straight lines, or no time is left to look
-        return step
+    shown = differences(search.problem, beside, step.active, behind, search.augmented.p)
     rivals = (
-        replace(rival, difference=max(rival.difference, levelled.get(rival.active.key, rival.difference)))
+        replace(rival, difference=max(rival.difference, shown.get(rival.active.key, rival.difference)))
         for rival in step.rivals
     )
     return replace(step, rivals=tuple(rivals))
+
+
+def differences(
+    problem: Problem,
+    beside: tuple[AppliedEffect, ...],
+    chosen: AppliedEffect,
+    behind: Mapping[K, AppliedEffect],
+    start: tuple[float, ...],
+) -> dict[K, float]:
+    """Return how far effects are behind a chosen one whatever is assumed between the rows, 0 at most.
+
+    Of none where an equation is solved between the rows, or where the chosen one reads nothing there.
+    """
+    motion = problem.model.capability.motion
+    if not behind or not chosen.effect.reads_between_rows or (motion is not None and motion.integrates):
+        return {}
+    try:
+        readings = _readings(problem, beside, chosen, start)
+        assumed, best = abs(readings[0] - readings[1]), max(readings)
+        return {
+            key: min(0.0, max(_readings(problem, beside, rival, start)) - best + assumed)
+            for key, rival in behind.items()
+        }
+    except (FitError, BudgetSpentError):  # it does not run with straight lines, or no time is left to look
+        return {}
 
 
 def _readings(

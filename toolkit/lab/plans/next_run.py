@@ -171,7 +171,8 @@ def _case_of(file: Path) -> Path:
 def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits:
     from toolkit.planning.run_changes import RunLimits
 
-    names = [channel.name for channel in case.drivers]
+    names = {channel.name: channel.unit for channel in case.drivers}
+    named = ", ".join(f"{name} [{unit}]" for name, unit in names.items())
     for option, texts in (("--limit", spans), ("--rate", rates)):
         stated = [text.partition("=")[0].strip() for text in texts]
         if twice := sorted({name for name in stated if stated.count(name) > 1}):
@@ -186,11 +187,14 @@ def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits
             ends = ()
         rising = len(ends) == count and all(map(math.isfinite, ends)) and (ends[0] < ends[-1] or count == 1)
         if name.strip() not in names or not rising or (count == 1 and ends[0] <= 0):
-            raise _wrong("a limit cannot be read", option, text, f"{form} of {', '.join(names)}",
-                         f"write for example {names[0]}={'-10..10' if count > 1 else '5'}")  # fmt: skip
+            example = f"{case.drivers[0].name}={'-10..10' if count > 1 else '5'}"
+            raise _wrong(
+                "a limit cannot be read", option, text, f"{form} of {named}, numbers alone",
+                f"write for example {example}",
+            )  # fmt: skip
         return name.strip(), ends
 
-    values = dict(read(text, "--limit", "NAME=LOW..HIGH", 2) for text in spans)
+    values = dict(read(text, "--limit", "NAME=LOW..HIGH, the lower one first,", 2) for text in spans)
     fastest = dict(read(text, "--rate", "NAME=MOST, above 0,", 1) for text in rates)
     return RunLimits(
         values={name: (low, high) for name, (low, high) in values.items()},
