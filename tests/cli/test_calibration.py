@@ -46,6 +46,13 @@ def session(tmp_path: Path) -> Path:
     return path
 
 
+def test_a_misspelt_instrument_is_not_one_without_records(run: Run, session: Path) -> None:
+    assert run("calibrate", session)[0] == 0
+    code, answer = run("calibration", "list", "pari")
+    assert (code, answer["error"]["rule"], answer["error"]["expected"]) == (2, "missing", "pair")
+    assert "did you mean 'pair'" in answer["error"]["next_step"]
+
+
 def test_calibrate_answers_as_the_contract_says(run: Run, session: Path, tmp_path: Path) -> None:
     code, answer = run("calibrate", session)
     # The random check loads of this session reach beyond its random loads, which is a note.

@@ -54,10 +54,22 @@ def test_init_makes_a_home_and_leaves_what_is_there(tmp_path: Path) -> None:
 
 def test_doctor_names_the_command_that_mends(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nonexistent")
+    monkeypatch.delenv("TOOLKIT_SOFFICE", raising=False)
     code, answer = commands.answer("doctor")
     assert code == 1
     assert installation.PACKAGES in answer["mend"]
     assert {c["name"] for c in answer["checks"] if not c["ok"]} >= {"soffice", "pdftotext"}
+
+
+def test_doctor_looks_for_the_program_that_reports_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(tmp_path / "soffice"))
+    code, answer = commands.answer("doctor")
+    assert (code, answer["mend"]) == (1, "unset TOOLKIT_SOFFICE")
+    assert [c["found"] for c in answer["checks"] if c["name"] == "soffice"] == [
+        f"TOOLKIT_SOFFICE={tmp_path / 'soffice'}: no such file"
+    ]
 
 
 def test_doctor_finds_nothing_missing_after_set_up() -> None:

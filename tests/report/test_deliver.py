@@ -279,6 +279,28 @@ def test_no_soffice(monkeypatch) -> None:
     assert "toolkit doctor" in str(caught.value.next_step)
 
 
+@pytest.mark.parametrize(
+    ("name", "why"), [("nowhere", "no such file"), (".", "a folder"), ("x", "not executable")]
+)
+def test_a_stated_soffice_that_is_no_program(tmp_path: Path, monkeypatch, name: str, why: str) -> None:
+    (tmp_path / "x").write_text("no program")
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(tmp_path / name))
+    with pytest.raises(RenderError, match="TOOLKIT_SOFFICE does not name a program") as caught:
+        Office()
+    assert caught.value.rule == "no-soffice"
+    assert caught.value.got == f"{tmp_path / name}: {why}"
+
+
+def test_a_folder_for_temporary_files_without_room_is_named(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _folder: usage._replace(free=300 * 1024))
+    with pytest.raises(RenderError, match="hardly room") as caught:
+        deliver(opened(tmp_path, p("x")), content(), tmp_path / "out")
+    assert tempfile.gettempdir() in str(caught.value.where)
+    assert caught.value.got == "0.3 MB free"
+
+
 def test_a_missing_value_leaves_the_old_report_alone(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("TOOLKIT_SOFFICE", str(fake(tmp_path, "exit 0")))
     out = tmp_path / "out"

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import gc
 import hashlib
 import json
 import re
+import resource
 import string
+import sys
+import tempfile
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +22,7 @@ import pytest
 import python_calamine
 
 from toolkit.characteristics.model import Characteristics, Row
-from toolkit.errors import ConfigError, RecordingError, ToolkitError
+from toolkit.errors import ConfigError, OutputError, RecordingError, ToolkitError
 from toolkit.findings import Finding
 from toolkit.machine import load_machine
 from toolkit.machine.definition import machine_file
@@ -63,6 +67,25 @@ def short(result: TestResult) -> TestResult:
         reduced=dataclasses.replace(result.reduced, conditions=result.reduced.conditions[:8]),
         characteristics=dataclasses.replace(result.characteristics, rows=result.characteristics.rows[:8]),
     )
+
+
+def test_a_full_folder_for_temporary_files_is_named_and_nothing_else_is_printed(
+    made: Made, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Unfinished sheets that fail once more at their end are printed as "Exception ignored in ...".
+    ignored: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", ignored.append)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OutputError, match="cannot be put together") as caught:
+            write_test_file(tmp_path / "test.xlsx", *made)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert tempfile.gettempdir() in str(caught.value.where)
+    del caught
+    gc.collect()
+    assert ignored == []
 
 
 def test_it_reads_back_to_the_same_result(made: Made, file: Path) -> None:

@@ -261,7 +261,7 @@ def read_test_folder(folder: Path) -> TestFolder:
             where=folder,
             got="no such file",
             expected=f"{TEST_FILE} with at least machine and date",
-            next_step=f"write {TEST_FILE}; 'toolkit demo --out DIR' shows one",
+            next_step=f"begin one with 'toolkit test new {folder / TEST_FILE}'",
             rule="no-test",
         )
     data = read_input(toml, SETTINGS_FILE)

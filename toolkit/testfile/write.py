@@ -16,7 +16,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
@@ -65,14 +65,16 @@ def write_test_file(path: Path, result: TestResult, recordings: Mapping[str, Rec
 
 def workbook(result: TestResult, recordings: Mapping[str, Recording] | None = None) -> tuple[bytes, str]:
     """Return the file that `write_test_file` writes, and the SHA-256 of its cells."""
+    from lxml.etree import SerialisationError
+
     try:
         with ExitStack() as files:
             return _workbook(result, recordings or {}, files)
-    except OSError as error:
+    except (OSError, SerialisationError) as error:  # the latter where lxml writes a sheet by itself
         raise OutputError(
             "the reduced test cannot be put together",
-            where="the folder for temporary files",
-            got=error.strerror or error,
+            where=f"the folder for temporary files, {tempfile.gettempdir()}",
+            got=getattr(error, "strerror", None) or error,
             expected="free space for temporary files",
             next_step="free space, or name another folder in TMPDIR; nothing was changed",
         ) from error
@@ -83,6 +85,7 @@ def _workbook(result: TestResult, recordings: Mapping[str, Recording], files: Ex
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
+    files.callback(_abandon, book)
     bodies: dict[str, IO[bytes]] = {}
     cells = CellsHash()
     use, info = result.reduced.calibration, result.reduced.info
@@ -110,6 +113,15 @@ def _workbook(result: TestResult, recordings: Mapping[str, Recording], files: Ex
     shell = BytesIO()
     book.save(shell)
     return filled(shell.getvalue(), bodies), cells.hexdigest()
+
+
+def _abandon(book: Any) -> None:
+    """End what is still being written: Python prints each end that fails after the first error."""
+    for sheet in book.worksheets:
+        for stream in (sheet._rows, sheet._writer and sheet._writer.xf):
+            with suppress(Exception):
+                if stream is not None:
+                    stream.close()
 
 
 def _sealed(provenance: Rows, cells: CellsHash) -> Rows:

@@ -79,6 +79,24 @@ def test_decimal_commas_are_named() -> None:
     assert "nothing was written" in str(refusal("\n".join([HEADER, "0,1,1"])).next_step)
 
 
+@pytest.mark.parametrize("number", ["1 000", "1\u202f000", "1\xa0000.5", "-12'500", "1\u2019000\u2019000"])
+def test_what_stands_between_thousands_is_named(number: str) -> None:
+    found = refusal("\n".join([HEADER, *ROWS, f"0.1,{number},1,up"]))
+    assert "nothing may stand between thousands" in str(found.next_step)
+
+
+def test_a_comment_in_the_first_line_is_no_decimal_comma() -> None:
+    step = str(refusal("\n".join(["# measured by hand", HEADER, *ROWS])).next_step)
+    assert step.startswith("take comments and titles out")
+
+
+def test_a_file_of_another_kind_is_not_taken_for_reference_loads() -> None:
+    # The cells of a case's recording are read here, too.
+    with pytest.raises(SessionError) as caught:
+        read_table(b"\x89PNG\r\n\x1a\n\0\0", where="run.csv", required=["S", "F"])
+    assert (caught.value.what, caught.value.rule) == ("the file is no table", "not-a-workbook")
+
+
 def test_every_bad_cell_is_told_at_once_in_the_order_of_the_rows() -> None:
     text = "\n".join([HEADER, "x,1,1,up", "0.1,,1.5,up", "0.2,2,1,sideways", "0.3,3,1,down"]) + "\n"
     first = refusal(text)

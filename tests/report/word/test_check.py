@@ -97,12 +97,26 @@ def test_a_figure_that_can_be_read_may_be_small(tmp_path: Path, width: str) -> N
         (p("{{tk:table.files}}") + tbl(["a"], ["{{tk:row.file|.1f}}"]), "bad-format"),
         (p(FIELD.format("DATE")), "date-field"),
         (p(FIELD.format("IF 1 = 1 yes no")), "if-field"),
+        (p(FIELD.format(" FILENAME ")), "stale-field"),
+        (p(FIELD.format("SECTIONPAGES")), "stale-field"),
+        (p(FIELD.format('STYLEREF "Heading 1"')), "stale-field"),
+        (p(FIELD.format("= 2+2")), "stale-field"),
+        (p(FIELD.format("REF _Ref1 \\h")), "broken-reference"),
+        (p(FIELD.format("PAGEREF")), "broken-reference"),
         (p('<w:ins w:id="1" w:author="x">' + run("new") + "</w:ins>"), "tracked-changes"),
     ],
 )  # fmt: skip
 def test_each_rule(tmp_path: Path, body: str, rule: str) -> None:
     assert rules(tmp_path, body) == [rule]
     assert rule in RULES
+
+
+@pytest.mark.parametrize(
+    "code", ["PAGE", "NUMPAGES", 'DOCPROPERTY "Company"', "TITLE", 'HYPERLINK "http://x.org"', "REF _ref1 \\h", "SEQ Figure", ""]
+)  # fmt: skip
+def test_fields_that_print_what_they_mean_are_left_alone(tmp_path: Path, code: str) -> None:
+    bookmark = '<w:bookmarkStart w:id="9" w:name="_Ref1"/><w:bookmarkEnd w:id="9"/>'
+    assert rules(tmp_path, p(bookmark, "x") + p(FIELD.format(code))) == []
 
 
 def test_a_tag_in_a_tracked_deletion_would_be_printed(tmp_path: Path) -> None:
@@ -202,9 +216,18 @@ def test_unsafe_files_are_refused(tmp_path: Path, edit, rule: str) -> None:
     assert caught.value.next_step
 
 
+OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+
+
 @pytest.mark.parametrize(
-    ("data", "got"), [(b"", "an empty file"), (b"MZ\x90", "b'MZ"), (b"PK\x03\x04cut", "not a zip")]
-)
+    ("data", "got"),
+    [
+        (b"", "an empty file"), (b"MZ\x90\x00", "a Windows program"), (b"PK\x03\x04cut", "not a zip"),
+        (b"{\\rtf1 x}", "an RTF document"),
+        (OLE + "EncryptedPackage".encode("utf-16-le"), "an encrypted Office file"),
+        (OLE + "WordDocument".encode("utf-16-le"), "an old Word document (.doc)"),
+    ],
+)  # fmt: skip
 def test_what_is_no_word_file_holds_nothing_to_remove(tmp_path: Path, data: bytes, got: str) -> None:
     (tmp_path / "x.docx").write_bytes(data)
     with pytest.raises(TemplateError) as caught:

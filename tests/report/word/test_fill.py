@@ -305,6 +305,39 @@ def test_pictures_take_the_width_asked_or_of_their_place(tmp_path: Path) -> None
     assert {tag for tag, _ in result.figures} == {"tk:figure.gough", "tk:figure.crat", "tk:figure.prat"}
 
 
+@pytest.mark.parametrize("stated", ["", '<w:trPr><w:cantSplit w:val="0"/><w:jc w:val="center"/></w:trPr>'])
+def test_no_page_ends_within_a_row_of_a_table(tmp_path: Path, stated: str) -> None:
+    # A file's name that was wrapped at the end of a page was on neither page: the report was refused.
+    table = tbl(["file", "hash"], ["{{tk:row.file}}", "{{tk:row.sha256}}"]).replace(
+        '<w:tr><w:tc><w:p><w:r><w:t xml:space="preserve">{{', f"<w:tr>{stated}<w:tc><w:p><w:r><w:t>{{{{"
+    )
+    assert stated in table
+    rows = list(root(filled(tmp_path, p("{{tk:table.files}}") + table)).iter(f"{{{W}}}tr"))[1:]
+    assert len(rows) == len(content().tables["files"].rows)
+    for row in rows:
+        assert next(e.tag for e in row) == f"{{{W}}}trPr"
+        (whole,) = row.findall(f"{{{W}}}trPr/{{{W}}}cantSplit")
+        assert not whole.attrib
+
+
+@pytest.mark.parametrize("figure", ["{{tk:figure.gough}}", "{{tk:figure.gough|width=400mm}}"])
+def test_a_picture_takes_no_more_than_the_line_of_its_paragraph_has(tmp_path: Path, figure: str) -> None:
+    # 60 mm of indentation on the left and 10 on the right: the page would cut it off.
+    indented = '<w:pPr><w:ind w:left="3402" w:right="567" w:hanging="0"/></w:pPr>'
+    result = filled(tmp_path, p(indented, figure) + p(sdt("tk:figure.crat", run("x"))))
+    narrow, whole = extents(result)
+    assert narrow == pytest.approx(whole - 70.0, abs=0.1)
+
+
+def test_a_picture_fits_into_the_narrowest_of_unequal_columns(tmp_path: Path) -> None:
+    def edit(members: dict[str, bytes]) -> None:
+        text = members["word/document.xml"]
+        columns = b'<w:cols w:num="2" w:equalWidth="0"><w:col w:w="2268" w:space="300"/><w:col w:w="6000"/></w:cols>'
+        members["word/document.xml"] = re.sub(rb"<w:cols[^>]*/>", columns, text)
+
+    assert extents(filled(tmp_path, p("{{tk:figure.gough}}"), edit=edit)) == [40.0]
+
+
 def test_a_figure_in_a_header_and_none_in_a_footnote(tmp_path: Path) -> None:
     result = filled(tmp_path, p("{{tk:figure.prat}}"), header=p("{{tk:figure.gough|width=20mm}}"))
     with zipfile.ZipFile(io.BytesIO(result.docx)) as archive:

@@ -94,6 +94,17 @@ class Registry:
         """Return the instruments, sorted."""
         return instruments_of(self.folder)
 
+    def no_instrument(self, name: str) -> RegistryError:
+        """Return the error of a name that no instrument has: ``missing``."""
+        meant = nearest(name, self.instruments())
+        return RegistryError(
+            "there is no such instrument", where=self.folder, got=name,
+            expected=", ".join(self.instruments()) or "an instrument with records: there is none yet",
+            next_step=("" if meant is None else f"did you mean {meant!r}? Else ")
+            + "see 'toolkit calibration list'; nothing was changed",
+            rule="missing",
+        )  # fmt: skip
+
     def ids(self, instrument: str) -> tuple[str, ...]:
         """Return the ids of an instrument, on disk or in its ledger, oldest first."""
         return record_ids(self.folder / instrument, self.ledger(instrument))

@@ -144,14 +144,15 @@ def _cells(
     header = [" ".join(str("" if cell is None else cell).split()) for cell in head]
     for number, (line, row) in enumerate(body, start=1):
         if len(row) != len(header):
-            split = len(row) > len(header) and separator == ","
+            split = len(row) > len(header) > 1 and separator == ","
             raise _error(
                 "a row has another number of cells than the header",
                 f"{where}, row {number} (line {line})",
                 f"{len(row)} cells: {', '.join(map(str, row))}", f"{len(header)} cells", "columns",
                 "correct the file (a number with a decimal comma makes two cells where commas stand between "
                 "the cells: save it with semicolons or tabs between them, or with a decimal point)"
-                if split else None,
+                if split else "take comments and titles out: the first line is the header"
+                if len(header) == 1 else None,
             )  # fmt: skip
     return Cells(
         where=where,
@@ -170,8 +171,8 @@ def is_empty(cell: object) -> bool:
 
 def _foreign(where: object, actual: object, rule: str) -> SessionError:
     return _error(
-        "the file is no table of reference loads", where, actual, FILES, rule,
-        "save it as .xlsx or as CSV, and name that file in the session; nothing was written",
+        "the file is no table", where, actual, FILES, rule,
+        "save it as .xlsx or as CSV, and name that file; nothing was written",
     )  # fmt: skip
 
 

@@ -41,6 +41,8 @@ _DECIMAL_COMMA = (
     "the number has a decimal comma, and commas stand between the cells too: save the file with semicolons "
     "or tabs between the cells, or with a decimal point; nothing was written"
 )
+_SPACED = re.compile(r"[+-]?\d{1,3}(?:[\s'\u2019]\d{3})+(?:[.,]\d+)?")
+_THOUSANDS = "nothing may stand between thousands: write the number without it; nothing was written"
 _MOST_FAULTS = 1000  # a file of another kind has millions
 _MOST_PLACES = 9  # of further cells in one message; `SessionError.further` has them all
 _CORRECT = "correct the cell, or remove the whole row with a reason in the laboratory's notes"
@@ -311,6 +313,8 @@ def _cell(cells: Cells, row: int, column: int, expected: str) -> SessionError:
         next_step = "the worksheet has merged cells, which hold one value: unmerge them and fill every row"
     elif is_empty(cell) and not cells.separator:
         next_step += "; a formula has a value only once a spreadsheet has computed and saved it"
+    elif isinstance(cell, str) and _SPACED.fullmatch(cell.strip()):
+        next_step = _THOUSANDS
     elif isinstance(cell, str) and "," in cell:
         next_step = _DECIMAL_COMMA if cells.separator == "," else _POINT_AND_COMMA
     elif hasattr(cell, "isoformat"):

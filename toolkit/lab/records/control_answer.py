@@ -109,7 +109,9 @@ def chart_answer(
     Raises
     ------
     ConfigError
-        the picture's name, the instrument or the sessions do not serve
+        the picture's name or the sessions do not serve
+    RegistryError
+        ``missing``: there is no such instrument
     """
     from toolkit.calibration.control.chart import chart_findings, control_chart
 
@@ -120,11 +122,7 @@ def chart_answer(
             next_step="choose one of them; nothing was written", rule="output-name",
         )  # fmt: skip
     if instrument not in registry.instruments():
-        raise ConfigError(
-            "the registry has no such instrument", where=registry.folder, got=instrument,
-            expected=", ".join(registry.instruments()) or "an instrument",
-            next_step="see 'toolkit calibration list'", rule="missing",
-        )  # fmt: skip
+        raise registry.no_instrument(instrument)
     chart = control_chart(registry, instrument, baseline=baseline, load=load)
     if not chart.series:
         raise ConfigError(

@@ -178,7 +178,15 @@ def listed(
     """Return the records with their state as JSON and as text, and whether all of them are sound.
 
     ``everything`` lists discarded candidates too.
+
+    Raises
+    ------
+    RegistryError
+        ``missing``: there is no such instrument, and nothing says that there was one
     """
+    unknown = instrument is not None and instrument not in registry.instruments()
+    if instrument is not None and unknown and registry.ledger(instrument).damage is None:
+        raise registry.no_instrument(instrument)
     rows: list[RecordRow | RefusedRow] = []
     heads: dict[str, Head] = {}
     known: dict[str, RecordStatus] = {}

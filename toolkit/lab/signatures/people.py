@@ -261,11 +261,7 @@ def lines_of(registry: Registry, instrument: str) -> list[str]:
     from toolkit.calibration.registry.settled import damaged
 
     if instrument not in ledgers_of(registry):
-        raise RegistryError(
-            "there is no such instrument", where=registry.folder, got=instrument,
-            expected=", ".join(registry.instruments()) or "an instrument with records: there is none yet",
-            next_step="see 'toolkit calibration list'; nothing was changed", rule="missing",
-        )  # fmt: skip
+        raise registry.no_instrument(instrument)
     if instrument not in registry.instruments():
         registry.people()  # every version of it is proved
         return raw_lines(registry, instrument)

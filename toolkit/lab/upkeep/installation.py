@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -10,8 +11,10 @@ from dataclasses import dataclass
 from typing import Annotated, TypedDict
 
 from toolkit.declared.answers import entry_of
+from toolkit.errors import RenderError
 from toolkit.lab.answers import table
 from toolkit.qualification.model import Check, NotCovered, QualificationRecord
+from toolkit.report.word.office import SOFFICE, find_soffice
 from toolkit.system import is_administrator
 
 PACKAGES = (
@@ -40,7 +43,10 @@ class DoctorAnswer(TypedDict):
 def doctor_answer() -> tuple[DoctorAnswer, str]:
     """Return what is looked for, Python, programs and fonts, and the command that mends it; as text too."""
     needs = [_python(), *_programs(), *_fonts()]
-    mend = None if all(need.ok for need in needs) else _mending_command()
+    missing = [need for need in needs if not need.ok]
+    mend = _mending_command() if missing else None
+    if [need.name for need in missing] == ["soffice"] and os.environ.get(SOFFICE):
+        mend = f"unset {SOFFICE}"
     rows = [["ok" if need.ok else "MISSING", need.name, need.found, need.needed_for] for need in needs]
     text = table(["", "what", "found", "needed for"], rows, align="<<<<")
     text += f"\n\nmend it with:\n  {mend}" if mend else "\n\nnothing is missing"
@@ -60,18 +66,23 @@ def _python() -> MachineNeed:
 
 
 def _programs() -> list[MachineNeed]:
-    programs = []
-    for program, needed_for in (
-        ("soffice", "reports as PDF"),
-        ("pdftotext", "verifying PDFs"),
-        ("pdffonts", "verifying PDFs"),
-        ("pdfinfo", "verifying PDFs"),
-    ):
+    programs = [_soffice()]
+    for program in ("pdftotext", "pdffonts", "pdfinfo"):
         path = shutil.which(program)
         programs.append(
-            MachineNeed(name=program, ok=path is not None, found=path or "not found", needed_for=needed_for)
+            MachineNeed(
+                name=program, ok=path is not None, found=path or "not found", needed_for="verifying PDFs"
+            )
         )
     return programs
+
+
+def _soffice() -> MachineNeed:
+    try:
+        found, ok = find_soffice(), True
+    except RenderError as error:
+        found, ok = f"{SOFFICE}={error.got}" if os.environ.get(SOFFICE) else "not found", False
+    return MachineNeed(name="soffice", ok=ok, found=found, needed_for="reports as PDF")
 
 
 def _fonts() -> list[MachineNeed]:

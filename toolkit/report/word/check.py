@@ -428,14 +428,6 @@ def advice(sites: list[Site]) -> Iterator[LintFinding]:
                 site, rows[0], "header-row",
                 f"{site.tag}: no header row is repeated on the next page: Table Layout, Repeat Header Rows",
             )  # fmt: skip
-        patterns = {id(row): row for neighbour in sites if (row := _prototype(table, neighbour)) is not None}
-        for row in patterns.values() if patterns else rows[-1:]:
-            if row.find(f"{q('w:trPr')}/{q('w:cantSplit')}") is None:
-                yield _note(
-                    site, row, "split-row",
-                    f"{site.tag}: a row may break across pages: Table Properties, Row, clear 'Allow row to "
-                    "break across pages'",
-                )  # fmt: skip
         if site.form == "literal" and site.element.tag == W_P:
             remainder = LITERAL.sub("", "".join(text.text or "" for text in site.element.iter(W_T))).strip()
             if remainder:
@@ -443,10 +435,6 @@ def advice(sites: list[Site]) -> Iterator[LintFinding]:
                     site, site.element, "table-paragraph",
                     f"{site.tag} shares its paragraph with {remainder[:40]!r}: let the tag stand alone in it",
                 )  # fmt: skip
-
-
-def _prototype(table: Element, site: Site) -> Element | None:
-    return row_in(table, site.element) if site.tag.family == "row" else None
 
 
 def _note(site: Site, element: Element, rule: str, message: str) -> LintFinding:

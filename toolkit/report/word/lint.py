@@ -56,13 +56,14 @@ RULES = {
     "comments": "the template holds comments",
     "date-field": "a DATE or TIME field becomes the day of printing",
     "if-field": "an IF field is not evaluated",
+    "stale-field": "a field is not computed when the report is printed",
+    "broken-reference": "a field refers to a bookmark that is not there",
     "contents": "a table of contents or an index is of a kind that is not updated",
     "missing-style": "a style that the style file names is not in the template",
     "font-unavailable": "a font is not installed and will be replaced",
     "character-undrawn": "no installed font has a character of the text",
     "placeholder": "a text stands for what somebody was to write there",
     "header-row": "the header row of a table is not repeated on the next page",
-    "split-row": "a row of a table may break across pages",
     "table-paragraph": "the paragraph of a table tag holds other text",
 }
 
@@ -93,6 +94,13 @@ def at_element(
     )
 
 
+# Fields that the print shows as they must be: LibreOffice computes the first, the others are what they were.
+# Of any other the print holds what stood in the template, nothing, or the name of a temporary file.
+_COMPUTED = "PAGE NUMPAGES SEQ REF PAGEREF TITLE SUBJECT KEYWORDS COMMENTS".split()
+_CONSTANT = (
+    "DOCPROPERTY DOCVARIABLE QUOTE HYPERLINK EQ ADVANCE AUTOTEXT MACROBUTTON GOTOBUTTON FORMTEXT "
+    "FORMCHECKBOX FORMDROPDOWN DISPLAYBARCODE XE TC TA"
+).split()
 _INDEXES = ("TOC", "INDEX", "TOA", "BIBLIOGRAPHY")
 _TRACKED = tuple(q(f"w:{one}") for one in ("ins", "del", "moveFrom", "moveTo", "rPrChange", "pPrChange"))
 
@@ -103,6 +111,7 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
     # Their elements are held, so that an identity stays that of one element.
     written = [field.begin for field in contents_fields(parts[0].root) if can_update(field)]
     placed = {id(one) for one in written}
+    bookmarks = {e.get(q("w:name"), "").lower() for s in parts for e in s.root.iter(q("w:bookmarkStart"))}
     for story in parts:
         for element in story.root.iter(*_TRACKED):
             yield at_element(
@@ -131,6 +140,14 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
                     f"this {word} field is updated by Word alone, not in the PDF: contents of headings, of "
                     "styles or of captions, in the body, are",
                 )
+            elif word and word not in (*_INDEXES, *_COMPUTED, *_CONSTANT):
+                message = (
+                    f"{word} is not computed for the PDF, which shows what stands in the template or nothing"
+                )
+                yield at_element("stale-field", story, element, message)
+            elif word in ("REF", "PAGEREF") and _target(code) not in bookmarks:
+                message = f"{word} refers to a bookmark that is not there: {_target(code) or 'none'}"
+                yield at_element("broken-reference", story, element, message, "error")
     yield from _unreached(package, parts)
     for story in parts:
         yield from _aside(story)
@@ -147,6 +164,11 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
 
 
 _DELETIONS = (q("w:del"), q("w:moveFrom"))
+
+
+def _target(code: str) -> str:
+    """Return the bookmark that a field refers to, which Word knows whatever its case."""
+    return next(iter(code.split()[1:]), "").strip('"').lower()
 
 
 def _deleted_tags(story: Story) -> Iterator[LintFinding]:

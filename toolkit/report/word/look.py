@@ -19,6 +19,7 @@ from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.controls import P_PR, R_PR, TC_PR, run_properties
 from toolkit.report.word.lint import LintFinding
 from toolkit.report.word.scan import LITERAL, Site, visible_texts
+from toolkit.report.word.styles import paragraph_styles, style_chain, style_defaults
 from toolkit.report.word.xml import W_P, W_R, W_TC, Element, ancestor, parser, q
 
 LEAST_SIZE = 7  # half-points
@@ -102,10 +103,10 @@ class _Looks:
             yield own
             named = own.find(q("w:rStyle"))
             if named is not None:
-                yield from self._chain(named.get(q("w:val")), R_PR)
+                yield from style_chain(self.package, named.get(q("w:val")), R_PR)
         if paragraph is not None:
-            yield from self._styles_of(paragraph, R_PR)
-        yield from self._defaults("w:rPrDefault", R_PR)
+            yield from paragraph_styles(self.package, paragraph, R_PR)
+        yield from style_defaults(self.package, "w:rPrDefault", R_PR)
 
     def _own_run(self, site: Site) -> tuple[Element | None, Element | None]:
         if site.form == "control":
@@ -132,47 +133,8 @@ class _Looks:
             spacing = own.find(q("w:spacing"))
             if spacing is None or spacing.get(q("w:lineRule")) != "exact":
                 yield own
-        yield from self._styles_of(paragraph, P_PR)
-        yield from self._defaults("w:pPrDefault", P_PR)
-
-    def _styles_of(self, paragraph: Element, kind: str) -> Iterator[Element]:
-        named = paragraph.find(f"{P_PR}/{q('w:pStyle')}")
-        yield from self._chain(None if named is None else named.get(q("w:val")), kind, default=True)
-
-    def _chain(self, identity: str | None, kind: str, *, default: bool = False) -> Iterator[Element]:
-        styles = self._styles()
-        if identity is None and default:
-            identity = next(
-                (
-                    name
-                    for name, style in styles.items()
-                    if style.get(q("w:type")) == "paragraph"
-                    and (style.get(q("w:default")) or "0") not in _OFF
-                ),
-                None,
-            )
-        seen: set[str] = set()
-        while identity in styles and identity not in seen:
-            seen.add(identity)
-            style = styles[identity]
-            if (properties := style.find(kind)) is not None:
-                yield properties
-            based = style.find(q("w:basedOn"))
-            identity = None if based is None else based.get(q("w:val"))
-
-    def _styles(self) -> dict[str, Element]:
-        root = self._styles_root()
-        return {} if root is None else {s.get(q("w:styleId")): s for s in root.iter(q("w:style"))}
-
-    def _styles_root(self) -> Element | None:
-        part = getattr(self.package.main_document_part, "_styles_part", None)
-        return None if part is None else part.element
-
-    def _defaults(self, name: str, kind: str) -> Iterator[Element]:
-        root = self._styles_root()
-        properties = None if root is None else root.find(f"{q('w:docDefaults')}/{q(name)}/{kind}")
-        if properties is not None:
-            yield properties
+        yield from paragraph_styles(self.package, paragraph, P_PR)
+        yield from style_defaults(self.package, "w:pPrDefault", P_PR)
 
     def _first(self, name: str, properties: list[Element]) -> Element | None:
         return next((e for p in properties if (e := p.find(q(name))) is not None), None)

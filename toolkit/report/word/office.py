@@ -94,7 +94,9 @@ _PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 <item oor:path="/org.openoffice.Setup/Office"><prop oor:name="ooSetupInstCompleted" oor:op="fuse"><value>true</value></prop></item>
 </oor:items>
 """
+SOFFICE = "TOOLKIT_SOFFICE"
 TIMEOUT_S = 180.0
+_ROOM = 64 * 2**20  # a profile takes some 10 MB, a long report with its PDF some more
 _MOST, _WORTH = 2, 2  # instances at once (200 MB each), and documents for which one more is started
 _STANDS, _BUSY, _LOOK_S = 0.02, 6, 10.0  # share of a core that is no work, patience of limits, seconds
 _SMALL, _SECONDS_PER_BYTE = 2 * 2**20, 100 / 2**20  # of the parts as they are unpacked
@@ -196,7 +198,7 @@ class Office:
         except RenderError as error:
             late, message = error, ""
         return [
-            pdf if _is_pdf(pdf) else late or _no_pdf(source.name, message)
+            pdf if _is_pdf(pdf) else late or _no_pdf(source.name, message, self.folder)
             for source, pdf in zip(documents, targets, strict=True)
         ]
 
@@ -332,7 +334,17 @@ def _is_pdf(path: Path) -> bool:
     return data[:5] == b"%PDF-" and b"%%EOF" in data[-1024:]
 
 
-def _no_pdf(name: str, message: str) -> RenderError:
+def _no_pdf(name: str, message: str, folder: Path) -> RenderError:
+    free = shutil.disk_usage(folder).free
+    if free < _ROOM:
+        return RenderError(
+            "LibreOffice made no PDF, and there is hardly room for one",
+            where=f"the folder for temporary files, {folder.parent}",
+            got=f"{free / 2**20:.1f} MB free",
+            expected=f"{_ROOM / 2**20:.0f} MB for a profile, a document and its PDF",
+            rule="render-failed",
+            next_step="free space, or name another folder in TMPDIR; nothing was changed",
+        )
     return RenderError(
         "LibreOffice made no PDF",
         where=name,
@@ -349,10 +361,21 @@ def find_soffice() -> str:
     Raises
     ------
     RenderError
-        it is not installed
+        it is not installed, or ``TOOLKIT_SOFFICE`` names no program
     """
-    program = os.environ.get("TOOLKIT_SOFFICE") or shutil.which("soffice") or shutil.which("libreoffice")
-    if program and (Path(program).is_file() or shutil.which(program)):
+    if stated := os.environ.get(SOFFICE):
+        if program := shutil.which(stated):
+            return program
+        path = Path(stated)
+        raise RenderError(
+            f"{SOFFICE} does not name a program",
+            where=f"the environment, {SOFFICE}",
+            got=f"{stated}: {'a folder' if path.is_dir() else 'not executable' if path.exists() else 'no such file'}",
+            expected="the path of LibreOffice's program soffice",
+            next_step=f"correct {SOFFICE}, or unset it: soffice is then looked for on the PATH",
+            rule="no-soffice",
+        )
+    if program := shutil.which("soffice") or shutil.which("libreoffice"):
         return program
     raise RenderError(
         "LibreOffice is not installed",

@@ -19,6 +19,7 @@ from lxml import etree
 from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import TEMPLATE_FILE, read_input
+from toolkit.recording.sniff import ole_kind, sniff
 from toolkit.report.word.xml import Element, parser, q, walk_fields
 
 _MAIN = "application/vnd.openxmlformats-officedocument.wordprocessingml.{}.main+xml"
@@ -126,7 +127,7 @@ def open_package(template: Template) -> Any:
 _NEXT = {
     **dict.fromkeys(
         ("not-word", "zip-damaged"),
-        "copy it again, or open it in Word and save it as .docx or .dotx",
+        "copy it again, or open it in Word and save it as .docx or .dotx, without a password",
     ),
     "strict-word": "open it in Word and save it as 'Word document (.docx)', not as 'Strict Open XML'",
 }
@@ -155,11 +156,12 @@ def _refuse(
 def _members(path: Path, raw: bytes) -> dict[str, bytes]:
     word = "a Word file (.docx or .dotx)"
     if not raw.startswith(b"PK"):
+        kind = sniff(raw)
         raise _refuse(
             path,
             "not-word",
             "the template is not a Word file",
-            got=f"{raw[:8]!r}..." if raw else "an empty file",
+            got=(ole_kind(raw) if kind.id == "ole" else kind).text,
             expected=word,
         )
     total, members, names = 0, {}, set()

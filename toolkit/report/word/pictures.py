@@ -22,7 +22,9 @@ from toolkit.report.word.chart import (
     chart_texts,
     chart_xml,
 )
+from toolkit.report.word.controls import P_PR
 from toolkit.report.word.scan import own_rows
+from toolkit.report.word.styles import paragraph_styles
 from toolkit.report.word.xml import (
     NS,
     W_P,
@@ -40,6 +42,7 @@ from toolkit.report.word.xml import (
 
 EMU_TWIP, EMU_INCH = 635, 914400
 _VML_EMU = {"pt": 12700, "in": 914400, "cm": 360000, "mm": 36000, "px": 9525}
+_OFF = ("0", "false", "off")
 _CELL_MARGIN = 2 * 108
 _LETTER = (12240, 15840, 1440)
 
@@ -121,7 +124,7 @@ def letters_of(at: Element, story: Story, width: int | None) -> float:
 def _size(at: Element, story: Story, width: int | None, slope: float) -> tuple[int, int]:
     """Return width and height [EMU] of a drawing whose height is ``slope`` times its width."""
     room, tall = _room(at, story)
-    page = max(_section(at, story)[0], 144) * EMU_TWIP
+    page = max(_section(at, story)[0] - _indentation(at, story), 144) * EMU_TWIP
     cx = min(width, page) if width else _placeholder_width(at) or room
     cy = round(cx * slope)
     return (round(cx * tall / cy), tall) if cy > tall else (cx, cy)
@@ -227,6 +230,7 @@ def _room(at: Element, story: Story) -> tuple[int, int]:
     cell = cell if cell is not None else ancestor(at, W_TC)
     if cell is not None and ancestor(cell, W_TBL) is not None:
         width = _cell_room(cell, width)
+    width -= _indentation(at, story)
     box = ancestor(at, q("w:txbxContent"))
     if box is not None:
         frame = next((e for tag in ("wp:anchor", "wp:inline") for e in box.iterancestors(q(tag))), None)
@@ -234,6 +238,24 @@ def _room(at: Element, story: Story) -> tuple[int, int]:
         if extent is not None:
             return max(int(extent.get("cx") or 0) - 2 * 91440, 91440), height * EMU_TWIP
     return max(width, 144) * EMU_TWIP, max(height, 144) * EMU_TWIP
+
+
+def _indentation(at: Element, story: Story) -> int:
+    """Return what the indentation of a paragraph takes from the width of its first line [twips]."""
+    paragraph = at if at.tag == W_P else ancestor(at, W_P)
+    paragraph = next(at.iter(W_P), None) if paragraph is None else paragraph
+    if paragraph is None:
+        return 0
+    own, styles = paragraph.find(P_PR), paragraph_styles(story.part.package, paragraph, P_PR)
+    stated = [p.find(q("w:ind")) for p in (own, *styles) if p is not None]
+
+    def number(*names: str) -> int:
+        texts = (ind.get(q(f"w:{name}")) for ind in stated if ind is not None for name in names)
+        text = next(filter(None, texts), "0")
+        return int(text) if text.removeprefix("-").isdigit() else 0
+
+    first = number("firstLine") - number("hanging")
+    return max(number("left", "start"), 0) + max(number("right", "end"), 0) + first
 
 
 def _cell_room(cell: Element, page: int) -> int:
@@ -329,5 +351,8 @@ def section_room(section: Element) -> tuple[int, int]:
         - number(margin, "top", _LETTER[2])
         - number(margin, "bottom", _LETTER[2])
     )
+    own = [number(column, "w", width) for column in section.iter(q("w:col"))]
+    if own and columns.get(q("w:equalWidth")) in _OFF:
+        return min(own), int(height * 0.92)  # it does not say in which of them
     count = max(number(columns, "num", 1), 1)
     return (width - (count - 1) * number(columns, "space", 720)) // count, int(height * 0.92)

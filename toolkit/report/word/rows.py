@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 
+from lxml import etree
+
 from toolkit.estimate import has_interval, round_to_uncertainty
 from toolkit.report.content import Cell, Table
 from toolkit.report.style import Style
@@ -58,6 +60,7 @@ def fill_table(
     tagged = _has_tags(prototype)
     index = {column.name: i for i, column in enumerate(table.columns)}
     free_row(prototype)
+    _keep_on_one_page(prototype)
     pattern = deepcopy(prototype)
     _forget_identity(pattern)
     literals, controls = _places(pattern)
@@ -106,6 +109,18 @@ def fill_table(
             elements.append(row)
     prototype.getparent().remove(prototype)
     return elements
+
+
+def _keep_on_one_page(row: Element) -> None:
+    """Let no page end within a row, where a value is cut; a row that is longer than a page goes on."""
+    properties = row.find(q("w:trPr"))
+    if properties is None:
+        properties = etree.Element(q("w:trPr"))
+        before = row.find(q("w:tblPrEx"))
+        row.insert(0 if before is None else row.index(before) + 1, properties)
+    for stated in properties.findall(q("w:cantSplit")):
+        properties.remove(stated)
+    properties.insert(0, etree.Element(q("w:cantSplit")))
 
 
 def _prototype(table: Element) -> Element:
