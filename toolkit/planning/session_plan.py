@@ -292,8 +292,10 @@ class _Finished:
         findings += [
             Finding(
                 rule="plan-range", where=f"{record.id}, {reach.load}",
-                message=f"{reach.load} is loaded from {reach.text}, where {record.id} is calibrated from "
-                f"{reach.calibrated_text}: the next record gives no U beyond what is loaded",
+                message=f"{reach.load} is loaded from {reach.low:.5g} to {reach.high:.5g} {reach.unit}, "
+                f"where {record.id} is calibrated from "
+                f"{reach.calibrated[0]:.5g} to {reach.calibrated[1]:.5g} {reach.unit}: the next record gives "
+                "no U beyond what is loaded",
             )
             for reach in self.search.reach
             if reach.short

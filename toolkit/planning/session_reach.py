@@ -50,15 +50,7 @@ class Reach:
     @property
     def text(self) -> str:
         """The interval with its unit."""
-        return self._written(self.low, self.high)
-
-    @property
-    def calibrated_text(self) -> str:
-        """The calibrated interval with its unit."""
-        return self._written(*self.calibrated)
-
-    def _written(self, low: float, high: float) -> str:
-        return f"{low:.5g} to {high:.5g} {self.unit.replace('*', '·')}"
+        return f"{self.low:.5g} to {self.high:.5g} {self.unit.replace('*', '·')}"
 
 
 def calibrated_interval(fit: LoadFit) -> tuple[float, float]:
