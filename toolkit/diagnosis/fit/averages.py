@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.fit.noise import layout
-from toolkit.diagnosis.fit.sensor_noise import QUICK, quick_sd, robust_sd, spread
+from toolkit.diagnosis.fit.sensor_noise import QUICK, robust_sd
 from toolkit.diagnosis.policy import AVERAGES, NOISE, ROWS
 from toolkit.diagnosis.simulators.averaged import usual_step, windows
 from toolkit.findings import Finding
@@ -89,13 +89,7 @@ def rows_averaged(problem: Problem, simulated: Stacked) -> int:
         AVERAGES.fewest
     ):
         most += 1
-    return int(
-        2
-        ** max(
-            _first(each, most, by_size=_is_off_smoothly(problem, name, simulated[name]))
-            for name, each in octaves.items()
-        )
-    )
+    return int(2 ** max(_first(each, most) for each in octaves.values()))
 
 
 def noisy_inputs(case: Case) -> frozenset[str]:
@@ -130,11 +124,8 @@ def moved_by_inputs(problem: Problem, simulated: Stacked, smooth: Stacked, rows:
     return False
 
 
-def _first(octaves: Sequence[Octave], most: int, *, by_size: bool) -> int:
-    """Return the first octave that is kept, 0 where all are.
-
-    Of what is weighed ``by_size`` quick changes are no more than they are.
-    """
+def _first(octaves: Sequence[Octave], most: int) -> int:
+    """Return the first octave that is kept, 0 where all are."""
     ratios = []
     for k in range(min(most + 1, len(octaves))):
         gain = sum(octave.gain for octave in octaves[k:])
@@ -142,8 +133,6 @@ def _first(octaves: Sequence[Octave], most: int, *, by_size: bool) -> int:
         ratios.append(gain / max(gain + dilution, 1e-300))
     enough = AVERAGES.slope * max(ratios, default=0.0)
     steady = [k for k, ratio in enumerate(ratios) if ratio >= enough]
-    if by_size:
-        return steady[0] if steady else 0
     first = next((k for k in steady if octaves[k].is_quiet), steady[-1] if steady else 0)
     return 0 if all(octave.is_quiet for octave in octaves[:first]) else first
 
@@ -220,7 +209,6 @@ def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
     from scipy.signal import csd, welch
 
     sums: dict[int, Array] = {}
-    by_size = _is_off_smoothly(problem, name, simulated)
     bent = _usual(problem, name, simulated)
     quickest = min(usual_step(run) for run in problem.case.runs)
     for run, place in zip(problem.runs, problem.slices, strict=True):
@@ -243,8 +231,6 @@ def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
             apart = [float(np.sum((1 - alike) * recorded)) for _, alike in followed]
             moved, alike = followed[apart[1] < AVERAGES.bent * apart[0]]
             weight = 1 / np.maximum(np.maximum(1 - alike, chance) * recorded, 1e-300)
-            if by_size:
-                weight = np.ones_like(recorded)
             shared, foreign = alike * moved, (1 - alike) * moved
             powers = np.stack([shared, foreign, recorded, shared * weight, foreign * weight])
             octaves = np.floor(-np.log2(np.maximum(2 * quickest * frequencies, 1e-12)) + 1e-9).astype(int)
@@ -252,18 +238,6 @@ def _octaves(problem: Problem, name: str, simulated: Array) -> list[Octave]:
                 total = len(at) * frequencies[1] * powers[:, octaves == k].sum(axis=1)
                 sums[k] = sums.get(k, 0) + total
     return [Octave(*map(float, sums.get(k, np.zeros(5)))) for k in range(max(sums, default=-1) + 1)]
-
-
-def _is_off_smoothly(problem: Problem, name: str, simulated: Array) -> bool:
-    """Tell whether an output is off by far more than moves from row to row: its rows are weighed by size.
-
-    Then the noise of an input that the simulation passes on is nothing beside what is to be explained.
-    """
-    residual = problem.observed[name] - simulated
-    kept = residual[problem.kept[name]]
-    size = math.sqrt(float(np.mean(kept**2))) if len(kept) else 0.0
-    quick = quick_sd(problem, residual, name)
-    return size > max(NOISE.largest * spread(problem, name), NOISE.mismatch * quick)
 
 
 def _usual(problem: Problem, name: str, simulated: Array) -> Array:
