@@ -24,7 +24,7 @@ from toolkit.effects.law import SCALED
 if TYPE_CHECKING:
     from toolkit.arrays import Array
     from toolkit.diagnosis.law.learn import Law, Laws
-    from toolkit.diagnosis.law.trial import Trial
+    from toolkit.diagnosis.law.trial import Signal, Trial
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
 
@@ -77,10 +77,7 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
             )
         ),
         curve=_curve(law, fitted, covariance, _quantile(search)),
-        ranges=tuple(
-            (signal.name, (float(signal.values.min()), float(signal.values.max())))
-            for signal in trial.signals
-        ),
+        ranges=tuple((signal.name, _range(search, signal)) for signal in trial.signals),
         resembles=tuple(ResembledEffect(name=name, distance=distance) for name, distance in law.resembles),
         confounded_with=law.confounded,
         evidence=LawEvidence(
@@ -88,6 +85,14 @@ def _found(search: Search, law: Law) -> DiagnosedLaw:
             share_of_gap=min(max(law.share, 0.0), 1.0),
         ),
     )  # fmt: skip
+
+
+def _range(search: Search, signal: Signal) -> tuple[float, float]:
+    """Return from where to where a signal went; a law of a motion is tried as far to either side."""
+    motion = search.problem.model.capability.motion
+    states = () if motion is None or not motion.integrates else motion.states
+    values = next((np.array(state.quantiles) for state in states if state.name == signal.name), signal.values)
+    return float(values.min()), float(values.max())
 
 
 def _place(trial: Trial) -> LawPlace:
