@@ -116,7 +116,7 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
 
 
 def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
-    """Return a search without effects and its laws, by the rest's size where these foretell better.
+    """Return a search without effects and its laws, by the rest's size where these foretell far better.
 
     Asked where the laws that rows show leave what is no noise; not of equations, whose own noise is coloured.
     """
@@ -127,8 +127,9 @@ def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sea
     if laws.listed and may_leave_noise(by_size.problem, search.refitted, laws.fit):
         return search, laws
     others = learned(by_size, withdrawn=False, budget=budget)
-    errors = [unseen_error(problem, each.held_out) for each in (laws, others)]
-    return (by_size, others) if others.listed and errors[1] < errors[0] else (search, laws)
+    by_rows, left = (unseen_error(problem, each.held_out) for each in (laws, others))
+    better = not laws.listed or left < by_rows + math.log(STEP.least_behind)
+    return (by_size, others) if others.listed and better else (search, laws)
 
 
 def _unlocked(problem: Problem, base: Fit, outputs: Sequence[str], before: Sequence[Law]) -> list[Law]:

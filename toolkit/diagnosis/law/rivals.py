@@ -126,6 +126,19 @@ def _holds_beside(laws: Laws, step: Step) -> bool:
     )
 
 
+def _turns_beside(laws: Laws, step: Step) -> bool:
+    """Tell whether all sizes of an effect have the other sign where laws stand beside it."""
+    beside = next((applied for applied in laws.fit.active if applied.key == step.active.key), None)
+    sizes = [parameter for parameter in step.active.searched if parameter.off is not None]
+    if beside is None or not sizes:
+        return False
+    before, after = (
+        np.array([applied.values[each.name] - (each.off or 0.0) for each in sizes])
+        for applied in (step.active, beside)
+    )
+    return bool((before * after < 0).all())
+
+
 def _leaves_process_noise(search: Search) -> bool:
     """Tell whether the effects found leave what is no noise, or in an equation more than its sensors'."""
     if search.problem.memory:
@@ -224,7 +237,7 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
 
     Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
     dropped where the held-out score of the laws beside refitted parameters is as good without it, where laws
-    as simple are better in its place and it is the small part of both, or where it has another size beside
+    as simple are better in its place and it is the small part of both, or where it has the other sign beside
     them. One that takes nearly all that
     the laws take in its place keeps its name: they mend its form (a leak of the load into a force, before or
     after the filter).
@@ -280,7 +293,7 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
         bare = fit(problem, listed, start=laws.fit.p)
         scores = hold_out(problem, search.folds, bare.active, bare)
         idle = outdone(search, laws) and all(_is_idle(laws.fit, step) for step in dropped)
-        astray = not any(_holds_beside(laws, step) for step in dropped)
+        astray = all(_turns_beside(laws, step) for step in dropped)
         needed = laws.held_out.total - scores.total >= STEP.least_gain
         if (
             needed

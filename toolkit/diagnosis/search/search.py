@@ -147,8 +147,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
 
     Rows are weighed by a noise of the rest's colour first: what leaves noise is found so, however small. In a
     rest that no colour makes noise each row foretells the next, and what is right makes corners in it. Where
-    what was found leaves such a rest, it is weighed by its size, and that stands, unless rows foretell
-    unseen ones far better.
+    what was found leaves such a rest, it is weighed by its size, and that stands if it leaves less than
+    half with no more effects.
 
     Parameters
     ----------
@@ -176,9 +176,9 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     by_size = _searched(weighed, folds, nominal, fit(weighed, start=refitted.p), seed, budget)
     if by_size.steps:
         by_rows, left = (unseen_error(problem, each.held_augmented) for each in (found, by_size))
-        # What rows add to it, and takes less than it leaves, imitates the rest.
-        halves = by_rows < left + math.log(1 - STEP.least_behind)
-        return found if found.steps and halves else by_size
+        halves = left < by_rows + math.log(1 - STEP.least_behind)
+        simpler = halves and len(by_size.steps) <= len(found.steps)
+        return by_size if simpler or not found.steps else found
     return found if found.steps else replace(found, by_size=by_size)
 
 
