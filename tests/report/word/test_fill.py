@@ -388,6 +388,15 @@ def _of_pages(kind: str):
     return edit
 
 
+def test_a_condition_within_a_line_is_a_place_of_a_mark(tmp_path: Path) -> None:
+    line = p("x ", sdt("tk:if.simulated", run("simulated")) + sdt("tk:if.unverified", run("unverified")))
+    made = content(simulated=True, unverified=True)
+    assert filled(tmp_path, line, made).marks_added == ()
+    assert filled(tmp_path, p("x"), made, header=line).marks_added == ()
+    empty = p("x ", sdt("tk:if.simulated", run(" ")) + sdt("tk:if.unverified", run("unverified")))
+    assert filled(tmp_path, empty, made).marks_added == ("simulated",)
+
+
 MARKS = p("{{tk:simulated}} {{tk:calibration.status}} {{tk:signature}}")
 
 

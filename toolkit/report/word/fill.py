@@ -415,8 +415,11 @@ def _witness(site: Site) -> Element | None:
 
 
 def _words_in(control: Element) -> Iterator[Element]:
-    texts = (text for paragraph in control.iter(W_P) for text in visible_texts(paragraph))
-    return (text for text in texts if (text.text or "").strip())
+    # A control stands around paragraphs, or within one.
+    paragraphs = list(control.iter(W_P)) or list(control.iterancestors(W_P))[:1]
+    texts = (text for paragraph in paragraphs for text in visible_texts(paragraph))
+    within = set(control.iter())
+    return (text for text in texts if text in within and (text.text or "").strip())
 
 
 def _stands(witness: Element | None, story: Story) -> bool:
