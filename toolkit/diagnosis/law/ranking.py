@@ -225,7 +225,7 @@ def _evaluated(problem: Problem, base: Fit, trial: Trial) -> Array:
     """Return what a law adds to its output, or the factor by which it scales a tire, for each amplitude."""
     applied, law = trial.applied, _formula(trial.applied)
     names = amplitudes(applied)
-    columns = np.zeros((problem.rows, len(names)))
+    columns, changes = (np.zeros((problem.rows, len(names))) for _ in range(2))
     for run, rows in zip(problem.runs, problem.slices, strict=True):
         if not applied.acts_in(run):
             continue
@@ -238,4 +238,24 @@ def _evaluated(problem: Problem, base: Fit, trial: Trial) -> Array:
             with np.errstate(all="ignore"):
                 change = np.broadcast_to(cast("Array", law(signals, values, run.t)), run.rows)
                 columns[rows, k] = simulated * change if trial.acts == "multiplies" else change
-    return columns
+                changes[rows, k] = change
+    # A zero or a gain is an effect, and no law of a signal that never changes its sign.
+    alike = applied.runs is None and is_one_number(changes)
+    return np.zeros_like(columns) if alike else columns
+
+
+def is_one_number(columns: Array) -> bool:
+    """Tell whether every column (n, k) has one value in all its rows."""
+    sizes = np.abs(columns).max(axis=0, initial=0.0)
+    return bool((np.ptp(columns, axis=0) <= LAWS.apart**0.5 * sizes).all())
+
+
+def at_unit_size(trial: Trial, values: Array) -> Array:
+    """Return a law of one signal without memory at values of it, (n,) to (n, amplitudes), each size one."""
+    law = _formula(trial.applied)
+    (signal,) = law.signals
+    sizes = [_unit(trial.applied, name).values for name in amplitudes(trial.applied)]
+    with np.errstate(all="ignore"):
+        return np.column_stack(
+            [np.broadcast_to(cast("Array", law({signal: values}, size)), len(values)) for size in sizes]
+        )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.law.ranking import all_responses, at_coefficients
+from toolkit.diagnosis.law.ranking import all_responses, at_coefficients, at_unit_size, is_one_number
 from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, ONE, TWO, Shape, pulse
 from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
@@ -49,7 +49,18 @@ def terms_of(problem: Problem) -> Iterator[Trial]:
             alike = pair[0].unit == pair[1].unit
             arguments += [(shape, pair) for shape in (*TWO, *(ALIKE if alike else ()))]
         for shape, signals in arguments:
-            yield from started(problem, shape, signals, "enters", channel, force=force)
+            for trial in started(problem, shape, signals, "enters", channel, force=force):
+                if not _is_a_force(trial, motion):
+                    yield trial
+
+
+def _is_a_force(trial: Trial, motion: Moving) -> bool:
+    """Tell whether a law of a state is one number wherever the state went: a force, and an effect."""
+    if trial.form != "static" or len(trial.signals) != 1:
+        return False
+    (signal,) = trial.signals
+    went = (np.array(state.quantiles) for state in motion.states if state.name == signal.name)
+    return is_one_number(at_unit_size(trial, next(went, signal.values)))
 
 
 def exchanges_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterator[Trial]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.search.proposals import likelihood_along
 
@@ -29,7 +30,11 @@ def may_wander(problem: Problem, applied: AppliedEffect) -> bool:
 def outdoes_wandering(problem: Problem, bare: Fit, made: Fit) -> bool:
     """Tell whether a recording prefers a fit to the one without a constant, each as it wanders likeliest.
 
-    An equation that cannot be followed says nothing against the constant.
+    An equation that cannot be followed says nothing against the constant. Nor does one beside which a free
+    simulation leaves the sensor's noise alone: what wanders is left in it.
     """
+    parts = [noise_parts(problem, made, name) for name in problem.names if problem.kept[name].any()]
+    if all(part.process_sd <= part.sensor_sd for part in parts):
+        return True
     before, after = (likelihood_along(problem, each) for each in (bare, made))
     return before is None or after is None or after - before > VERDICT.close
