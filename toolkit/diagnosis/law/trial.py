@@ -216,7 +216,7 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
                 for run, rows in zip(problem.runs, problem.slices, strict=True)
             ]
             rate, per_second = np.concatenate(rates), f"{bracketed(text)}/s"
-            if not _is_one_number(rate):
+            if not _never_varied(rate):
                 listed.append(
                     Signal(
                         written=f"rate([{name}])",
@@ -247,7 +247,7 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
     )
 
 
-def _is_one_number(rate: Array) -> bool:
+def _never_varied(rate: Array) -> bool:
     """Tell whether a rate never varied, but for a run's ends: a memory of it is a curve of the time."""
     low, usual, high = np.percentile(rate, [1, 50, 99])
     return bool(high - low <= LAWS.steady * abs(usual))

@@ -210,9 +210,8 @@ def _searched(
                 held_refitted = hold_out(problem, folds, (), refitted)
                 held_base = hold_out(problem, folds, base.active, base)
             share = STEP.later if turn else STEP.first
-            if (
-                turn and problem.memory
-            ):  # beside a rest that is no noise, what leaves more than it takes imitates
+            # Beside a rest that is no noise, what leaves more than it takes imitates it.
+            if turn and problem.memory:
                 share = STEP.least_behind
 
             def fitting(scored: Sequence[Scored], turn: int = turn) -> None:
