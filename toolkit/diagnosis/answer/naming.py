@@ -68,24 +68,22 @@ def imitates(search: Search) -> bool:
 def outweighed(search: Search) -> bool:
     """Tell whether what stays outweighs what effects explain.
 
-    By the log-likelihood, and by what they take of the held-out mean square that is above the noise. Nothing
-    outweighs effects that take more of an output's unseen rows than they leave there, nor a rest of which a
-    search that was cut short has not seen what it is.
+    By what they take of the held-out mean square that is above the noise; where none is, by the
+    log-likelihood. Nothing outweighs effects that take more of an output's unseen rows than they leave there,
+    nor a rest of which a search that was cut short has not seen what it is.
     """
     if not search.structure or (search.steps and cut_short(search.skipped)):
         return False
     shown = _taken(search)
-    if any(removed > VERDICT.nearly * above for removed, above in shown) or _takes_more_than_is_left(search):
+    if any(removed >= VERDICT.taken * above for removed, above in shown) or _takes_more_than_is_left(search):
         return False
+    if all(step.active.effect.from_digits for step in search.steps):
+        return not search.steps  # read off the digits: it does not imitate anything
     unexplained = max(
         (structure.gain / 2 for structure in search.structure if not structure.rest), default=0.0
     )
     explained = sum(step.gain for step in search.steps)
-    if explained < VERDICT.mostly * (explained + unexplained):
-        return True
-    if all(step.active.effect.from_digits for step in search.steps):
-        return not search.steps  # read off the digits: it does not imitate anything
-    return bool(shown) and all(removed < VERDICT.taken * above for removed, above in shown)
+    return bool(shown) or explained < VERDICT.mostly * (explained + unexplained)
 
 
 def _is_smooth(search: Search) -> bool:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from toolkit.diagnosis.fit.folds import hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
-from toolkit.diagnosis.law.terms import exchanges_of, pulses_of, terms_of
+from toolkit.diagnosis.law.terms import joint_terms_of, pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
     curve_trial,
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Law:
-    """One law that was learned; of an exchange the one in the other equation is its ``counterpart``.
+    """One law that was learned; of one in several equations the next is its ``counterpart``.
 
     ``held_out_gain`` is None of an event; ``shares`` are what it takes of each output's mean square above
     the noise, on held-out rows where it predicts; ``confounded`` are the nominal parameters that moved far
@@ -65,6 +65,11 @@ class Law:
     confounded: tuple[str, ...]
     resembles: tuple[tuple[str, float], ...] = ()
     counterpart: Law | None = None
+
+    @property
+    def together(self) -> tuple[Law, ...]:
+        """The law, and those in other equations that are one with it."""
+        return (self, *(() if self.counterpart is None else self.counterpart.together))
 
     @property
     def predicts(self) -> bool:
@@ -106,7 +111,7 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
                 listed += _unlocked(search.problem, base, outputs, listed)
                 break
             law, base, held_out = outcome
-            listed += [law] if law.counterpart is None else [law, law.counterpart]
+            listed += law.together
             if search.problem.shown_sd:  # noise it may be now: what was none has been taken from it
                 rest = taken_for_noise(search.problem, search.folds, base, turn)
                 outputs = tuple(part.output for part in rest)
@@ -191,12 +196,12 @@ def _next(
         )
         if trial.applied.key not in present
     ]
-    exchanges = [
+    joint = [
         trial
-        for trial in exchanges_of(problem, base, screen)
+        for trial in joint_terms_of(problem, base, screen)
         if not present.intersection(applied.key for applied in trial.together)
     ]
-    looked = len(trials) + len(exchanges)
+    looked = len(trials) + len(joint)
     likely = [
         trial
         for trial in ranked(problem, base, screen, trials, weight)
@@ -205,7 +210,7 @@ def _next(
     near = [trial for trial in likely if trial.gain > STEP.far_behind * likely[0].gain]
     near = near[: LAWS.fitted]
     # Two equations at once are ranked with no single one: each of them is fitted.
-    near += [trial for trial in exchanges if p_value(trial, looked) < LAWS.alpha]
+    near += [trial for trial in joint if p_value(trial, looked) < LAWS.alpha]
     fitted = _fitted(problem, base, near, weight)
     if fitted and (drawn := curve_trial(problem, fitted[0][1])) is not None:
         best = fitted[0][0] - base.log_posterior
@@ -356,17 +361,14 @@ def _law(
         {name: problem.observed[name] - each.simulated[name] for name in problem.names}
         for each in ((base, refit) if event else (held_out, scores))
     ]
-    law = Law(
-        trial=trial,
-        applied=fitted[0],
-        p_value=p_value,
-        held_out_gain=None if event else scores.total - held_out.total,
-        share=_taken(problem, *errors),
-        confounded=tuple(moved),
-    )
-    if trial.partner is None:
-        return law
-    return replace(law, counterpart=replace(law, trial=trial.partner, applied=fitted[1]))
+    share, gained = _taken(problem, *errors), None if event else scores.total - held_out.total
+    law: Law | None = None
+    for part, applied in zip(reversed(trial.parts), reversed(fitted), strict=True):
+        law = Law(
+            trial=part, applied=applied, p_value=p_value, held_out_gain=gained, share=share,
+            confounded=tuple(moved), counterpart=law,
+        )  # fmt: skip
+    return cast("Law", law)
 
 
 def _is_told_from_none(refit: Fit, trust: float, count: int = 1) -> bool:

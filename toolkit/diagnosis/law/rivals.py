@@ -66,10 +66,7 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
         return search, laws if alone.complete else replace(laws, complete=False)
     if bare.problem.shown_sd and leaves_noise and not _process_noise(search, alone.fit):
         return bare, alone
-    alike = take_as_much(
-        search.problem, search.held_refitted, search.held_augmented, alone.held_out, least=least
-    )
-    if alike and not _does_with_fewer(search, alone):
+    if is_plainer(search, alone, least=least) and not _does_with_fewer(search, alone):
         return search, laws
     if any(_holds_beside(laws, step) for step in search.steps):
         more = parameters_of(alone.fit) - parameters_of(laws.fit)
@@ -81,6 +78,18 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
     return bare, alone
+
+
+def is_plainer(search: Search, alone: Laws, *, least: float) -> bool:
+    """Tell whether effects take as good as all that laws in their place take, or with fewer parameters most.
+
+    A shape with more in it takes more of whatever is left: it has to earn what it costs in plainness.
+    """
+    plainer = parameters_of(search.augmented) < parameters_of(alone.fit)
+    return take_as_much(
+        search.problem, search.held_refitted, search.held_augmented, alone.held_out,
+        least=min(least, VERDICT.taken) if plainer else least,
+    )  # fmt: skip
 
 
 def _does_with_fewer(search: Search, alone: Laws) -> bool:

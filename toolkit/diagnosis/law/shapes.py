@@ -136,6 +136,10 @@ ALIKE: tuple[Shape, ...] = (
     _static("a*({x} - {z})*abs({x} - {z})", about_zero=False, a="{y}/{x}^2"),
 )
 """Shapes of two signals in one unit: an exchange between them."""
+EACH: tuple[Shape, ...] = tuple(
+    shape for shape in ONE if shape.text in {"a*{x}", "a*{x}*abs({x})", "a*{x}**3"}
+)
+"""Shapes of its own state that all equations of one kind may lack."""
 MODE = Shape(
     form="mode", text="a*mode({x}, frequency, damping)", starts=_modes,
     units={"a": "{y}/{x}", "frequency": "Hz", "damping": "1"},

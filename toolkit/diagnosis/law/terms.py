@@ -8,14 +8,14 @@ a coarse grid finds them where the simulation rings, each period being a hill.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.law.ranking import all_responses, at_coefficients, at_unit_size, is_one_number
-from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, ONE, TWO, Shape, pulse
+from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, EACH, ONE, TWO, Shape, pulse
 from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
 from toolkit.diagnosis.search.case_view import CaseView
@@ -63,42 +63,64 @@ def _is_a_force(trial: Trial, motion: Moving) -> bool:
     return is_one_number(at_unit_size(trial, next(went, signal.values)))
 
 
-def exchanges_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterator[Trial]:
-    """Give what two states of one kind may exchange, with its gain: one law in the equations of both.
+def joint_terms_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterator[Trial]:
+    """Give laws that the equations of several states of one kind may lack at once, with their gains.
 
-    What one loses the other has, less or more by how much each holds. In one equation alone it would be a
-    loss to nowhere.
+    What two states exchange: what one loses the other has, less or more by how much each holds; in one
+    equation alone it would be a loss to nowhere. And what all of them have, each by its own state, or by how
+    far that is from an input of its unit: a rod that gives heat to the room does so along all of its length,
+    and of no one place does a loss explain much.
     """
     motion = problem.model.capability.motion
     if motion is None or not motion.integrates:
         return
     states = {state.name: np.array(state.quantiles) for state in motion.states}
-    for pair in itertools.combinations([name for name in entered(problem, motion) if name in states], 2):
-        units = {reduced(motion.units(name)[1]) for name in pair}
-        if len(units) > 1:
-            continue
-        of_both = {
-            name: Signal(written=f"[{name}]", name=name, unit=next(iter(units)), values=states[name])
-            for name in pair
+    kinds: dict[tuple[str, str], dict[str, str]] = {}
+    for name, of in entered(problem, motion).items():
+        if name in states:
+            kinds.setdefault((reduced(motion.units(name)[1]), reduced(motion.units(name)[0])), {})[name] = of
+    for (text, force), alike in kinds.items():
+        of_each = {
+            name: Signal(written=f"[{name}]", name=name, unit=text, values=states[name]) for name in alike
         }
-        for shape in ALIKE:
+        arguments: list[tuple[Shape, dict[str, tuple[Signal, ...]]]] = [
+            (shape, dict.fromkeys(pair, tuple(of_each[name] for name in pair)))
+            for pair in itertools.combinations(alike, 2)
+            for shape in ALIKE
+        ]
+        if len(alike) > 1:
+            listed = {name: _signals(problem, motion, name, of) for name, of in alike.items()}
+            arguments += [(shape, {name: own[:1] for name, own in listed.items()}) for shape in EACH]
+            others = [signal for signal in next(iter(listed.values()))[1:] if signal.name not in alike]
+            arguments += [
+                (shape, {name: (own[0], other) for name, own in listed.items()})
+                for other in others
+                if other.unit == text
+                for shape in ALIKE
+            ]
+        for shape, places in arguments:
             trials = [
-                trial_at(
-                    problem, shape, tuple(of_both.values()), "enters", name, {},
-                    force=reduced(motion.units(name)[0]),
-                )
-                for name in pair
-            ]  # fmt: skip
-            answered = list(all_responses(problem, base, trials))
-            if any(each is None for each in answered):
-                continue
-            stacked = {
-                name: np.hstack([each[name] for each in answered if each is not None])
-                for name in problem.names
-            }
-            gain, sizes, trust = screen.gain(stacked)
-            first, other = (at_coefficients(trial, [size]) for trial, size in zip(trials, sizes, strict=True))
-            yield replace(first, partner=other, gain=gain * trust)
+                trial_at(problem, shape, signals, "enters", name, {}, force=force)
+                for name, signals in places.items()
+            ]
+            joined = _joined(problem, base, screen, trials)
+            if joined is not None:
+                yield joined
+
+
+def _joined(problem: Problem, base: Fit, screen: LinearisedFit, trials: Sequence[Trial]) -> Trial | None:
+    """Return laws as one of several equations, with its gain; None where one of them moves nothing."""
+    answered = list(all_responses(problem, base, trials))
+    if any(each is None for each in answered):
+        return None
+    stacked = {
+        name: np.hstack([each[name] for each in answered if each is not None]) for name in problem.names
+    }
+    gain, sizes, trust = screen.gain(stacked)
+    joined = None
+    for trial, size in zip(reversed(trials), reversed(list(sizes)), strict=True):
+        joined = replace(at_coefficients(trial, [size]), partner=joined, gain=gain * trust)
+    return joined
 
 
 def entered(problem: Problem, motion: Moving) -> dict[str, str]:

@@ -96,7 +96,7 @@ class Trial:
     ``unit`` is that of what it adds, or of its factor. ``swayed`` is, of a law that scales what drives a
     tire, how every output answers to its factor, (rows,). ``looked`` counts the laws that were looked at to
     find it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
-    ``partner`` is the same law in another equation: what one body loses the other has.
+    ``partner`` is the same law in another equation, which may have one: what one body loses the other has.
     """
 
     shape: Shape
@@ -111,9 +111,14 @@ class Trial:
     partner: Trial | None = None
 
     @property
+    def parts(self) -> tuple[Trial, ...]:
+        """The law, and those of its partners."""
+        return (self, *(() if self.partner is None else self.partner.parts))
+
+    @property
     def together(self) -> tuple[AppliedEffect, ...]:
-        """The law, and that of its partner."""
-        return (self.applied, *(() if self.partner is None else self.partner.together))
+        """What is fitted at once."""
+        return tuple(part.applied for part in self.parts)
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -60,19 +60,19 @@ def laws_on_unseen_runs(
     """
     motion = problem.model.capability.motion
     integrates = motion is not None and motion.integrates
-    if integrates or not asked_of_unseen_runs(problem, folds, base, screen):
+    if integrates or not asked_of_unseen_runs(problem, folds, base, screen, UNSEEN.runs_of_laws):
         return []
     shown = []
     for trial in _ranked(problem, base, screen, trials, weight)[: UNSEEN.fitted]:
         made = joint_fit(problem, base, (trial.applied,), plain=True)
         # What does not take most of the rows that it was fitted to takes less of others.
-        if made is None or at_bound(made.active[-1]) or not takes_most(problem, base, made):
+        if made is None or at_bound(made.active[-1]) or not takes_most(problem, base, made, UNSEEN.every):
             continue
         try:
             held_out = hold_out(problem, folds, made.active, made)
         except FitError:
             continue
-        if takes_most(problem, held_base, held_out):
+        if takes_most(problem, held_base, held_out, UNSEEN.every):
             shown.append((trial, made, held_out))
     if not shown:
         return []

@@ -205,6 +205,11 @@ def best_step(
             break
     if not standing:
         return None
+    # What fits beside parameters that nobody believes yields to what takes its place beside believable ones.
+    believed = [(trial, scores) for trial, scores in standing if _is_believable(problem, trial.fit)]
+    if believed:
+        joint = [trial for trial in joint if _is_believable(problem, trial.fit)]
+        standing = believed
     # The first fits best. Where more than noise is left, that is also what the fit made of the rest, and one
     # that foretells unseen rows better goes before it; the better fit then stays in its class.
     best = max(standing, key=lambda entry: entry[1].total)
@@ -217,6 +222,11 @@ def best_step(
         rivals=rivals(problem, trial, joint),
     )
     return trial.fit, scores, step
+
+
+def _is_believable(problem: Problem, made: Fit) -> bool:
+    """Tell whether no parameter of the simulation is far off its prior."""
+    return bool(np.all(np.abs(problem.off_priors(made.p)) <= PRIORS.far))
 
 
 def drifts_faster(problem: Problem, before: Fit, after: Fit) -> bool:

@@ -133,17 +133,26 @@ def _left(problem: Problem, simulated: Mapping[str, Array]) -> float:
     return float(np.mean(_runs(problem, simulated)))
 
 
-def asked_of_unseen_runs(problem: Problem, folds: Folds, base: Fit, screen: LinearisedFit) -> bool:
-    """Tell whether whole runs that no fit has seen have to say what is right, as no noise can."""
-    enough = folds.by_run and len(problem.runs) >= UNSEEN.runs
+def asked_of_unseen_runs(
+    problem: Problem, folds: Folds, base: Fit, screen: LinearisedFit, least: int = UNSEEN.runs
+) -> bool:
+    """Tell whether whole runs that no fit has seen have to say what is right, as no noise can.
+
+    Parameters
+    ----------
+    least : runs, of which fewer agree by chance
+    """
+    enough = folds.by_run and len(problem.runs) >= least
     few = screen.trust(base.noise) <= SCREENING.least_trust
     return enough and few and is_beyond_noise(problem, base)
 
 
-def takes_most(problem: Problem, before: HeldOut | Fit, after: HeldOut | Fit) -> bool:
+def takes_most(
+    problem: Problem, before: HeldOut | Fit, after: HeldOut | Fit, usual: float = UNSEEN.usual
+) -> bool:
     """Tell whether most of the error is gone: nearly all of it in the median run, and half in every one."""
     shares = 1 - _runs(problem, after.simulated) / np.maximum(_runs(problem, before.simulated), 1e-300)
-    return bool(np.median(shares) > UNSEEN.usual and shares.min() > UNSEEN.every)
+    return bool(np.median(shares) > usual and shares.min() > UNSEEN.every)
 
 
 def gains_of(problem: Problem, before: HeldOut, shown: Sequence[tuple[Fit, HeldOut]]) -> list[float]:
