@@ -29,7 +29,7 @@ from toolkit.diagnosis.law.trial import (
     unlocked_tone,
 )
 from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
-from toolkit.diagnosis.policy import LAWS, PRIORS, STEP, STRUCTURE, VERDICT
+from toolkit.diagnosis.policy import LAWS, PRIORS, SCREENING, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.bends import at_bound
 from toolkit.diagnosis.search.forward_step import joint_fit
 from toolkit.diagnosis.search.noise_floor import may_leave_noise
@@ -202,15 +202,15 @@ def _next(
         if not present.intersection(applied.key for applied in trial.together)
     ]
     looked = len(trials) + len(joint)
+    # Of a rest that is known to be no noise the question is which law it is, and not whether there is one.
+    alpha = SCREENING.alpha if set(outputs) <= set(problem.memory) else LAWS.alpha
     likely = [
-        trial
-        for trial in ranked(problem, base, screen, trials, weight)
-        if p_value(trial, looked) < LAWS.alpha
+        trial for trial in ranked(problem, base, screen, trials, weight) if p_value(trial, looked) < alpha
     ]
     near = [trial for trial in likely if trial.gain > STEP.far_behind * likely[0].gain]
     near = near[: LAWS.fitted]
     # Two equations at once are ranked with no single one: each of them is fitted.
-    near += [trial for trial in joint if p_value(trial, looked) < LAWS.alpha]
+    near += [trial for trial in joint if p_value(trial, looked) < alpha]
     fitted = _fitted(problem, base, near, weight)
     if fitted and (drawn := curve_trial(problem, fitted[0][1])) is not None:
         best = fitted[0][0] - base.log_posterior

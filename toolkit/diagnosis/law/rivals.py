@@ -64,7 +64,12 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     alone = learned(bare, withdrawn=False, budget=budget)
     if not any(law.predicts for law in alone.listed):
         return search, laws if alone.complete else replace(laws, complete=False)
-    if bare.problem.shown_sd and leaves_noise and not _process_noise(search, alone.fit):
+    if (
+        bare.problem.shown_sd
+        and leaves_noise
+        and not _process_noise(search, alone.fit)
+        and _foretell_no_worse(search, alone)
+    ):
         return bare, alone
     if is_plainer(search, alone, least=least) and not _does_with_fewer(search, alone):
         return search, laws
@@ -98,16 +103,24 @@ def _does_with_fewer(search: Search, alone: Laws) -> bool:
     A law may be one effect's own formula, with a size more or less. It is not that of two: these imitate it
     together, however much of it they take. Better is a higher held-out score, and no output with more error.
     """
-    problem, named = search.problem, search.held_augmented
     return (
         len(alone.listed) < len(_effects(search))
         and parameters_of(alone.fit) < parameters_of(search.augmented)
-        and alone.held_out.total - named.total >= STEP.least_gain
-        and all(
-            _error(problem, alone.held_out, name) <= _error(problem, named, name)
-            for name in problem.names
-            if problem.kept[name].any()
-        )
+        and alone.held_out.total - search.held_augmented.total >= STEP.least_gain
+        and _foretell_no_worse(search, alone)
+    )
+
+
+def _foretell_no_worse(search: Search, alone: Laws) -> bool:
+    """Tell whether laws leave no output with more error on unseen rows than all effects do.
+
+    What happened once, in one run, leaves little of it there and foretells nothing of another.
+    """
+    problem = search.problem
+    return all(
+        _error(problem, alone.held_out, name) <= _error(problem, search.held_augmented, name)
+        for name in problem.names
+        if problem.kept[name].any()
     )
 
 

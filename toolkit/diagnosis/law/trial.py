@@ -53,6 +53,7 @@ from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
+    from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -297,9 +298,9 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
                 yield from started(problem, shape, (signal,), "adds", output)
                 if ITSELF not in signal.written and multiplies:
                     yield from started(problem, shape, (signal,), "multiplies", output)
-            timed = problem.case.has_time and signal.name != "time" and signal.remembered
-            for shape in REMEMBERING if timed else ():
-                yield from started(problem, shape, (signal,), "adds", output)
+            if signal.name != "time" and signal.remembered:
+                for shape in remembering(problem.case):
+                    yield from started(problem, shape, (signal,), "adds", output)
         steady = [signal for signal in signals if signal.steady]
         for pair in itertools.combinations(steady, 2):
             for shape in TWO:
@@ -314,6 +315,13 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
             for signal, start in itertools.product(followed, rung(line.frequency)):
                 yield trial_at(problem, MODE, (signal,), "adds", output, start)
         yield from _events(problem, base, output)
+
+
+def remembering(case: Case) -> tuple[Shape, ...]:
+    """Return the shapes with a memory: a loop remembers an order alone, all others how long ago."""
+    if case.has_time:
+        return REMEMBERING
+    return tuple(shape for shape in REMEMBERING if shape.form == "loop" and case.has_order)
 
 
 def _locked(problem: Problem, base: Fit, output: str, line: Line, time: Signal) -> Iterator[Trial]:
