@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace as Of
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from toolkit.diagnosis.law import rivals
 from toolkit.diagnosis.law.learn import Law, Laws
 from toolkit.diagnosis.law.rivals import judged_by_laws, outdone, without_imitations, without_untested
 from toolkit.diagnosis.law.trial import trials_of
+from toolkit.diagnosis.policy import LAWS, VERDICT
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit
@@ -315,3 +317,14 @@ def test_two_names_go_where_a_single_law_of_fewer_parameters_does_better(
     judged, listed = judged_by_laws(search, nothing_beside, seed=1, budget=ample())
     assert (judged.steps == steps) is stay
     assert listed is (nothing_beside if stay else alone)
+
+
+@pytest.mark.parametrize(
+    ("named", "laws", "least"), [(2, 3, VERDICT.taken), (2, 2, LAWS.same), (3, 2, LAWS.same)]
+)
+def test_a_plain_name_beside_a_shape_with_more_in_it_needs_most_of_what_that_takes(named, laws, least):
+    def made(count):
+        """Return a fit of so many searched parameters."""
+        return Of(active=tuple(Of(searched=(None,)) for _ in range(count)))
+
+    assert rivals.least_share(made(named), made(laws)) == least

@@ -1,5 +1,7 @@
 """What a step takes: of equals the likeliest, and what coloured noise of few rows only hints at."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -121,7 +123,7 @@ def test_where_more_than_noise_is_left_the_effect_that_foretells_better_goes_bef
         return HeldOut(scores=(totals[start],), simulated=dict(problem.observed), fits=())
 
     monkeypatch.setattr(forward_step, "hold_out", foretold)
-    monkeypatch.setattr(forward_step, "_leaves_more_than_noise", lambda *_: not noise_alone)
+    monkeypatch.setattr(forward_step, "leaves_more_than_noise", lambda *_: not noise_alone)
     nothing = HeldOut(scores=(0.0,), simulated=before.simulated, fits=())
     outcome = best_step(problem, folds_of(problem, base), base, nothing, two, view.p_of, STEP.first, before)
     assert outcome is not None
@@ -154,3 +156,30 @@ def test_what_its_own_fit_refuses_is_held_out_never(fitted_step, monkeypatch):
     monkeypatch.setattr(forward_step, "hold_out", lambda *_: pytest.fail("a fit for each fold in vain"))
     folds = folds_of(problem, base)
     assert best_step(problem, folds, base, before, joint, view.p_of, STEP.first, before) is None
+
+
+@pytest.mark.parametrize(("off", "place"), [((0.0, 0.0), 0), ((4.0, 0.0), 1), ((4.0, 5.0), 0)])
+def test_what_needs_a_parameter_that_nobody_believes_yields_to_what_needs_none(
+    fitted_step, monkeypatch, off, place
+):
+    problem, base, view, two, before = fitted_step
+    farther = [
+        Joint(scored=joint.scored, fit=replace(joint.fit, p=(0.02 + 0.004 * by,)), score=joint.score)
+        for joint, by in zip(two, off, strict=True)
+    ]
+
+    def foretold(problem, folds, active, start):
+        return HeldOut(scores=(100.0,), simulated=before.simulated, fits=())
+
+    for name, value in (
+        ("hold_out", foretold),
+        ("matters", lambda *_: True),
+        ("beyond_form", lambda *_: True),
+    ):
+        monkeypatch.setattr(forward_step, name, value)
+    monkeypatch.setattr(forward_step, "leaves_more_than_noise", lambda *_: True)
+    p_of = {id(joint.scored): 0.001 for joint in two}
+    nothing = HeldOut(scores=(0.0,), simulated=before.simulated, fits=())
+    taken = best_step(problem, (), base, nothing, farther, p_of, STEP.first, before)
+    assert taken is not None
+    assert taken[2].active.key == two[place].fit.active[-1].key

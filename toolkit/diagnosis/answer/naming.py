@@ -13,7 +13,7 @@ from toolkit.diagnosis.answer.held_out_errors import held_out_errors
 from toolkit.diagnosis.answer.next_measurements import implausible
 from toolkit.diagnosis.fit.sensor_noise import spread
 from toolkit.diagnosis.fit.structure import RUNS
-from toolkit.diagnosis.law.rivals import parameters_of, take_as_much
+from toolkit.diagnosis.law.rivals import least_share, parameters_of, take_as_much
 from toolkit.diagnosis.policy import SCREENING, VERDICT
 from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.search import Search
@@ -36,7 +36,10 @@ def kept_beside_laws(search: Search, laws: Laws) -> Search:
     predicting = any(law.predicts for law in laws.listed)
     if not predicting or parameters_of(laws.fit) < parameters_of(search.augmented):
         return search
-    if not take_as_much(search.problem, search.held_refitted, search.held_augmented, laws.held_out):
+    least = least_share(search.augmented, laws.fit)
+    if not take_as_much(
+        search.problem, search.held_refitted, search.held_augmented, laws.held_out, least=least
+    ):
         return search
     return replace(search, kept=True)
 

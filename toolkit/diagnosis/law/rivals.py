@@ -71,7 +71,11 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
         and _foretell_no_worse(search, alone)
     ):
         return bare, alone
-    if is_plainer(search, alone, least=least) and not _does_with_fewer(search, alone):
+    alike = take_as_much(
+        search.problem, search.held_refitted, search.held_augmented, alone.held_out,
+        least=least_share(search.augmented, alone.fit, least),
+    )  # fmt: skip
+    if alike and not _does_with_fewer(search, alone):
         return search, laws
     if any(_holds_beside(laws, step) for step in search.steps):
         more = parameters_of(alone.fit) - parameters_of(laws.fit)
@@ -85,16 +89,17 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     return bare, alone
 
 
-def is_plainer(search: Search, alone: Laws, *, least: float) -> bool:
-    """Tell whether effects take as good as all that laws in their place take, or with fewer parameters most.
+def least_share(named: Fit, laws: Fit, least: float = LAWS.same) -> float:
+    """Return the share of what laws in their place take that effects have to take to keep their names.
 
-    A shape with more in it takes more of whatever is left: it has to earn what it costs in plainness.
+    A shape with more in it takes more of whatever is left, and has to earn it: beside laws with more
+    parameters most is enough.
+
+    Parameters
+    ----------
+    least : of laws with no more parameters
     """
-    plainer = parameters_of(search.augmented) < parameters_of(alone.fit)
-    return take_as_much(
-        search.problem, search.held_refitted, search.held_augmented, alone.held_out,
-        least=min(least, VERDICT.taken) if plainer else least,
-    )  # fmt: skip
+    return min(least, VERDICT.taken) if parameters_of(named) < parameters_of(laws) else least
 
 
 def _does_with_fewer(search: Search, alone: Laws) -> bool:
@@ -332,7 +337,8 @@ def _dropped(search: Search, laws: Laws, dropped: tuple[Step, ...]) -> tuple[Sea
             augmented, held_out = search.refitted, search.held_refitted
     except FitError:
         return None
-    if take_as_much(problem, held_out, search.held_augmented, scores):
+    least = least_share(search.augmented, bare)
+    if take_as_much(problem, held_out, search.held_augmented, scores, least=least):
         return None
     values = {applied.key: applied for applied in (*bare.active, *augmented.active)}
     searched = replace(
