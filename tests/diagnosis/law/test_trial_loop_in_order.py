@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 
@@ -18,7 +20,7 @@ def _bent(seed: int) -> pd.DataFrame:
     """Return a column bent to and fro, each time farther: a spring beside friction that yields."""
     rng = np.random.default_rng(seed)
     ends = np.concatenate([[0.0], *[[size, -size] for size in (0.01, 0.02, 0.03, 0.04)]])
-    x = np.concatenate([np.linspace(a, b, 60, endpoint=False) for a, b in zip(ends, ends[1:], strict=False)])
+    x = np.concatenate([np.linspace(a, b, 60, endpoint=False) for a, b in itertools.pairwise(ends)])
     held, loop = 0.0, []
     for step in np.diff(x, prepend=x[0]):  # a stop: elastic to its limit, and there it slides
         held = float(np.clip(held + step / REACH, -1, 1))

@@ -24,7 +24,7 @@ def simulate(inputs, p):
 
 
 @pytest.mark.parametrize(("pulled", "has_rate"), [("ramp", False), ("stairs", True), ("swing", True)])
-def test_a_rate_of_one_value_is_no_signal(tmp_path, pulled, has_rate):
+def test_a_rate_of_one_value_is_no_signal_and_has_no_past(tmp_path, pulled, has_rate):
     (tmp_path / "sim.py").write_text(RUBBER)
     (tmp_path / "case.toml").write_text(
         case_text(
@@ -38,9 +38,11 @@ def test_a_rate_of_one_value_is_no_signal(tmp_path, pulled, has_rate):
     table.to_csv(tmp_path / "r0.csv", index=False)
     case = read_case(tmp_path / "case.toml")
     problem = problem_of(case, model_of(case, None))
-    names = {signal.name for signal in signals_of(problem, fit(problem), "F")}
-    assert "strain" in names
-    assert ("dstrain/dt" in names) is has_rate
+    signals = {signal.name: signal for signal in signals_of(problem, fit(problem), "F")}
+    assert ("dstrain/dt" in signals) is has_rate
+    # A memory of a ramp is a curve of where it is.
+    assert signals["strain"].remembered is has_rate
+    assert signals["F"].remembered is has_rate
 
 
 def test_of_laws_that_are_one_on_the_rows_the_shortest_is_told():

@@ -162,7 +162,7 @@ def test_what_its_own_fit_refuses_is_held_out_never(fitted_step, monkeypatch):
 def test_what_needs_a_parameter_that_nobody_believes_yields_to_what_needs_none(
     fitted_step, monkeypatch, off, place
 ):
-    problem, base, view, two, before = fitted_step
+    problem, base, _view, two, before = fitted_step
     farther = [
         Joint(scored=joint.scored, fit=replace(joint.fit, p=(0.02 + 0.004 * by,)), score=joint.score)
         for joint, by in zip(two, off, strict=True)

@@ -117,6 +117,7 @@ ONE: tuple[Shape, ...] = (
     # A latch: the slope of a bump of energy pushes back before it and pulls on behind it.
     _static("a*({x} - c)*exp(-((({x} - c)/w)**2))", _bumps, a="{y}/{x}", c="{x}", w="{x}"),
     _static("a*exp({x}/d)", _growths, a="{y}", d="{x}"),
+    _static("a*(exp({x}/d) - 1)", _growths, a="{y}", d="{x}"),
     _static(
         f"a1*sin({_TURN}*{{x}}/period) + a2*cos({_TURN}*{{x}}/period)", _periods, a1="{y}", a2="{y}",
         period="{x}",
@@ -165,6 +166,13 @@ BESIDE: tuple[Shape, ...] = (
     ),
 )  # fmt: skip
 """Shapes in the equation of a state: what follows a signal late, or swings beside it, and pulls at it."""
+
+
+def remembering(*, timed: bool, ordered: bool) -> tuple[Shape, ...]:
+    """Return the shapes with a memory: a loop remembers an order alone, all others how long ago."""
+    return tuple(shape for shape in REMEMBERING if timed or (ordered and shape.form == "loop"))
+
+
 TONE = Shape(
     form="tone", units={"a1": "{y}", "a2": "{y}", "frequency": "Hz"},
     text=f"a1*sin({_TURN}*frequency*[time]) + a2*cos({_TURN}*frequency*[time])",

@@ -23,7 +23,6 @@ from toolkit.diagnosis.fit.structure import filled
 from toolkit.diagnosis.law.shapes import (
     MODE,
     ONE,
-    REMEMBERING,
     TONE,
     TWO,
     UNLOCKED,
@@ -31,6 +30,7 @@ from toolkit.diagnosis.law.shapes import (
     Form,
     Shape,
     curve,
+    remembering,
     rung,
 )
 from toolkit.diagnosis.policy import LAWS, STRUCTURE
@@ -53,7 +53,6 @@ from toolkit.units import unit
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
-    from toolkit.diagnosis.case.case import Case
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
 
@@ -207,7 +206,7 @@ def bracketed(text: str) -> str:
 
 
 def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
-    """Return what a law on an output may depend on: inputs, their rates and ways, the output itself, time."""
+    """Return what a law on an output may depend on: inputs, their rates and ways, itself, time."""
     case, timed = problem.case, problem.case.has_time
     view = CaseView(problem, output)
     listed = []
@@ -216,47 +215,54 @@ def signals_of(problem: Problem, base: Fit, output: str) -> tuple[Signal, ...]:
         if np.ptp(values) <= 1e-9 * np.abs(values).max(initial=0.0):
             return
         listed.append(Signal(written=f"[{name}]", name=of, unit=text, values=values, origin=view.origin(of)))
-        if timed:
+        if timed and not _went_straight(problem, values):
             rates = [
                 np.gradient(values[rows], run.t) if run.rows > 1 else np.zeros(run.rows)
                 for run, rows in zip(problem.runs, problem.slices, strict=True)
             ]
-            rate, per_second = np.concatenate(rates), f"{bracketed(text)}/s"
-            if not _never_varied(rate):
-                listed.append(
-                    Signal(
-                        written=f"rate([{name}])",
-                        name=f"d{of}/dt",
-                        unit=per_second,
-                        values=rate,
-                        steady=False,
-                    )
-                )
+            written, per_second = f"rate([{name}])", f"{bracketed(text)}/s"
+            rate = np.concatenate(rates)
+            listed.append(
+                Signal(written=written, name=f"d{of}/dt", unit=per_second, values=rate, steady=False)
+            )
 
+    driven = []
     for channel in case.drivers:
         if all(channel.name in run.columns for run in problem.runs):
             values = np.concatenate([run.columns[channel.name] for run in problem.runs])
             if np.isfinite(values).all():
                 with_rate(channel.name, channel.name, values, channel.unit)
+                driven += [values] if np.ptp(values) > 0 else []
                 if timed and is_speed(channel.unit):
                     listed.append(_way(problem, channel.name, channel.unit, values))
     with_rate(ITSELF, output, filled(base.simulated[output]), channel_unit(case, problem.model, output))
+    motion = problem.model.capability.motion
+    solved = motion is not None and motion.integrates
+    if timed and driven and not solved and all(_went_straight(problem, each) for each in driven):
+        # What all went at one rate has no past of its own: a memory is a curve of where it is.
+        listed = [replace(each, remembered=False) for each in listed if each.steady]
     if timed:
         times = np.concatenate([run.t for run in problem.runs])
         listed.append(Signal(written="[time]", name="time", unit="s", values=times, steady=False))
     records = [each for each in listed if not each.steady and _is_record_of(problem, output, each)]
     of_records = {name for each in records for name in formula(each.written).signals}
     return tuple(
-        replace(each, remembered=not of_records.intersection(formula(each.written).signals))
+        replace(
+            each, remembered=each.remembered and not of_records.intersection(formula(each.written).signals)
+        )
         for each in listed
         if each not in records
     )
 
 
-def _never_varied(rate: Array) -> bool:
-    """Tell whether a rate never varied, but for a run's ends: a memory of it is a curve of the time."""
-    low, usual, high = np.percentile(rate, [1, 50, 99])
-    return bool(high - low <= LAWS.steady * abs(usual))
+def _went_straight(problem: Problem, values: Array) -> bool:
+    """Tell whether a signal went at one rate in all runs, but for its noise: that rate is one number."""
+    t, x = (
+        np.concatenate([column[rows] - column[rows].mean() for rows in problem.slices])
+        for column in (np.concatenate([run.t for run in problem.runs]), values)
+    )
+    line = t * float(t @ x) / max(float(t @ t), 1e-300)
+    return float(np.sum((x - line) ** 2)) <= LAWS.steady**2 * float(line @ line)
 
 
 def _is_record_of(problem: Problem, output: str, signal: Signal) -> bool:
@@ -299,7 +305,7 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
                 if ITSELF not in signal.written and multiplies:
                     yield from started(problem, shape, (signal,), "multiplies", output)
             if signal.name != "time" and signal.remembered:
-                for shape in remembering(problem.case):
+                for shape in remembering(timed=problem.case.has_time, ordered=problem.case.has_order):
                     yield from started(problem, shape, (signal,), "adds", output)
         steady = [signal for signal in signals if signal.steady]
         for pair in itertools.combinations(steady, 2):
@@ -315,13 +321,6 @@ def trials_of(problem: Problem, base: Fit, outputs: Sequence[str]) -> Iterator[T
             for signal, start in itertools.product(followed, rung(line.frequency)):
                 yield trial_at(problem, MODE, (signal,), "adds", output, start)
         yield from _events(problem, base, output)
-
-
-def remembering(case: Case) -> tuple[Shape, ...]:
-    """Return the shapes with a memory: a loop remembers an order alone, all others how long ago."""
-    if case.has_time:
-        return REMEMBERING
-    return tuple(shape for shape in REMEMBERING if shape.form == "loop" and case.has_order)
 
 
 def _locked(problem: Problem, base: Fit, output: str, line: Line, time: Signal) -> Iterator[Trial]:
