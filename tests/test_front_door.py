@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import doctest
 import re
 import shutil
@@ -16,6 +17,7 @@ import pint
 import pytest
 
 import toolkit
+from toolkit.calibration.records.record import Zero
 from toolkit.errors import ColumnError, ConfigError, RecordError, ToolkitError, UnitError
 
 INDICATIONS = {"D51": 0.1, "D52": 0.2, "E5": 0.3}
@@ -195,9 +197,21 @@ def test_a_tare_is_taken_off_and_rows_beyond_the_range_are_told(record: toolkit.
     assert record.apply(shifted, tare=stated).value["FY"] == pytest.approx(untared)
     with pytest.raises(ColumnError, match="tare"):
         record.apply(shifted, tare={"D51": 0.05})
-    far = record.apply({f"{name} [mV/V]": [value, 9.0] for name, value in INDICATIONS.items()})
+    far = record.apply({f"{name} [mV/V]": [value, 9.0] for name, value in INDICATIONS.items()}, tare=tare)
     assert {finding.rule for finding in far.findings} == {"beyond-range"}
     assert record.apply(_plain(), uncertainty=False).U == {}
+
+
+@pytest.mark.parametrize(("zero", "level"), [("tared", "warning"), ("run", "warning"), ("included", "note")])
+def test_indications_without_a_tare_are_told_as_a_test_without_one(
+    zero: Zero, level: str, record: toolkit.Record
+) -> None:
+    """A bridge that stands at 0.5 mV/V makes hundreds of newtons out of nothing, beside a U of one."""
+    fitted = dataclasses.replace(record, result=dataclasses.replace(record.result, zero=zero))
+    (found,) = fitted.apply(_plain(), uncertainty=False).findings
+    assert (found.rule, found.level) == ("no-tare", level)
+    assert ("fitted on tared indications" in found.message) == (zero != "included")
+    assert not fitted.apply(_plain(), tare=dict.fromkeys(INDICATIONS, 0.0), uncertainty=False).findings
 
 
 def test_rows_that_are_the_same_have_one_budget_between_them(

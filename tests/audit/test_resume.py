@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import resource
 import shutil
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from toolkit import machine as machine_module
 from toolkit.audit import archive as archive_module
 from toolkit.audit.archive import audit_archive
 from toolkit.audit.one_file import ArchivedFile
-from toolkit.audit.resume import RESULTS, Results
+from toolkit.audit.resume import RESULTS, Done, Results
 from toolkit.calibration.registry.registry import Registry
 from toolkit.declared import json_value, object_of
 from toolkit.errors import OutputError
@@ -153,3 +155,23 @@ def test_a_large_file_has_the_same_hash_as_a_small_one(archive, tmp_path, asked,
     monkeypatch.setattr("toolkit.audit.resume._SMALL", 100)  # every file is read in pieces
     audit_archive(archive, registry(), out=tmp_path / "out")
     assert asked == []
+
+
+def _put_until_full(folder, told):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
+    try:
+        with Results(folder, archive=folder, registry_hash="") as results:
+            for number in range(100):
+                results.put(f"{number}.xlsx", Done(sha256=None, body=b"{}" * 50))
+    except Exception as error:  # noqa: BLE001  whatever comes out of it is what a user reads
+        told.put((type(error).__name__, str(getattr(error, "where", None))))
+
+
+def test_a_full_disk_is_told_with_the_file_that_has_no_room(tmp_path):
+    """Closing the file writes again what could not be written: that error is none of its own."""
+    fork = multiprocessing.get_context("fork")
+    told = fork.Queue()
+    process = fork.Process(target=_put_until_full, args=(tmp_path, told))
+    process.start()
+    assert told.get(timeout=60) == ("OutputError", str(tmp_path / RESULTS))
+    process.join()

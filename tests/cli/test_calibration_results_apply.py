@@ -228,7 +228,7 @@ def test_a_row_beyond_the_calibrated_range_is_a_finding(rig: Path, tmp_path: Pat
     words = [data, "--out", tmp_path / "o.csv", "--home", rig / "lab", "--on", "2026-02-05"]
     code, told = commands.answer("calibration", "apply", "press-7-r1", *words)
     assert code == 1
-    assert [finding["rule"] for finding in told["findings"]] == ["beyond-range"]
+    assert [finding["rule"] for finding in told["findings"]] == ["no-tare", "beyond-range"]
     assert math.isclose(told["loads"]["FX"]["largest"], 18e3, rel_tol=1e-3)
 
 

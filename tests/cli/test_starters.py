@@ -98,6 +98,10 @@ def test_what_no_header_tells_is_said_and_left_out(folder: Path) -> None:
     _, told = commands.answer("session", "new", "s.toml", "--from", "loads.csv")
     assert told["not_guessed"] == ["remark: no unit that is known; write 'NAME [unit]'"]
     assert told["open"] == ["instrument", "date", "operator"]
+    # What `calibrate` would refuse is to be mended, and not "nothing must be filled in".
+    assert told["lacking"] == {
+        "data": "loads.csv may not have remark: a session's table has no columns of other use"
+    }
     # Cells that are read in units of force: no unit tells them from the loads.
     (folder / "lbf.csv").write_text("run,direction,A [lbf],B [lbf],FY [N]\n1,up,0,0,0\n")
     _, told = commands.answer("session", "new", "t.toml", "--from", "lbf.csv")

@@ -149,6 +149,18 @@ def test_the_worst_of_several_files_is_the_exit_code(run: Run, tmp_path: Path) -
     assert code == 1
 
 
+@pytest.mark.parametrize("seal", [plain_pdf, sealed_pdf])
+def test_of_a_document_that_names_no_record_no_ledger_is_said_to_know_none(
+    run: Run, tmp_path: Path, seal: Callable[[], bytes]
+) -> None:
+    """An unsigned laboratory's certificate prints its record's hash, and carries none: nothing was asked."""
+    (tmp_path / "a.pdf").write_bytes(seal())
+    _, answer = run(tmp_path / "a.pdf")
+    assert (answer["ledger"], answer["still_holds"]) == ("unknown", None)
+    assert "no ledger here knows" not in answer["why"]
+    assert "carries no record's hash" in answer["why"]
+
+
 def test_a_certificate_named_at_the_command_is_trusted_too(run: Run, tmp_path: Path) -> None:
     other = make_authority("Other authority")
     (tmp_path / "root.pem").write_bytes(other.pem)

@@ -88,6 +88,34 @@ def test_a_cell_that_stands_still_in_some_blocks(tmp_path, value, rule):
     assert "rows 41 to 80" in found.message
 
 
+@pytest.mark.parametrize(
+    ("of_D51", "word"),
+    [
+        (lambda D51: D51, "last digit"),
+        (lambda D51: -D51, "other sign"),
+        (lambda D51: D51 + 12.5, "last digit"),
+    ],
+    ids=["copy", "turned", "another zero"],
+)
+@pytest.mark.parametrize(("read", "level"), [(None, "error"), (("E5",), "warning")])
+def test_a_cell_that_is_a_copy_of_another_one(tmp_path, of_D51, word, read, level):
+    """Two amplifiers have two noises: a channel that was connected twice has one."""
+    D51 = recording(rows=100)["D51"] + np.round(np.random.default_rng(7).normal(0, 1, 100), 4)
+    (found,) = health(tmp_path, D51=D51, D52=np.round(of_D51(D51), 10), read=read)
+    assert (found.rule, found.level) == ("copied-channel", level)
+    assert "D51" in found.message
+    assert "D52" in found.message
+    assert word in found.message
+    assert "copied-channel" in {note.rule for note in notes(tmp_path, D51=D51, D52=np.round(of_D51(D51), 10))}
+
+
+def test_cells_of_coarse_digits_that_agree_by_chance_are_no_copies(tmp_path):
+    coarse = np.where(np.arange(100) == 50, 101.0, 100.0)
+    assert "copied-channel" not in {found.rule for found in health(tmp_path, D51=coarse, D52=coarse)}
+    ramp = np.arange(100) * 0.5
+    assert "copied-channel" not in {found.rule for found in health(tmp_path, D51=ramp, D52=ramp)}
+
+
 def test_one_sample_held_over_each_block(tmp_path):
     held = {name: np.repeat([1.0, 2, 3, 4, 5], 20) * 100 for name in ("D51", "D52", "E5", "FZ")}
     (found,) = health(tmp_path, **held)

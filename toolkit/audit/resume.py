@@ -10,6 +10,7 @@ and an editor may set them.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -166,7 +167,9 @@ class Results:
 
     def __exit__(self, *_: object) -> None:
         if self._path is not None:
-            self._file.close()  # and with it the lock
+            # Every line is flushed: only what a full disk refused, which was told, is written again here.
+            with contextlib.suppress(OSError):
+                self._file.close()  # and with it the lock
 
     def known(self, names: Sequence[str]) -> Iterator[str]:
         """Yield those of the names whose results still hold."""

@@ -20,6 +20,9 @@ from toolkit.errors import SessionError
 
 INTERCEPT = "intercept"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+NAME_FORM = (
+    "names of letters A to Z, digits and '_', a letter first, as in D51 and S_x: they stand in equations"
+)
 _FACTOR = re.compile(r"(?:(?P<name>[A-Za-z]\w*)(?:\^(?P<power>[1-9]))?|abs\((?P<abs>[A-Za-z]\w*)\))\Z")
 
 

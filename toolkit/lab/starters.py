@@ -271,7 +271,14 @@ def _session(name: str, columns: Sequence[Column]) -> Guess:
     silent = [f"{plain}: no unit that is known; write 'NAME [unit]'" for plain, kind in stated if not kind]
     headers = {plain.lower() for _, plain, _ in columns}
     absent = [key for key in ("run", "direction") if key not in headers]
-    lacking = {"data": f"{name} needs the column {' and the column '.join(absent)}"} if absent else {}
+    needs = [f"{name} needs the column {' and the column '.join(absent)}"] if absent else []
+    if unread := [
+        plain for plain, _ in stated if loads and indications and plain not in (*loads, *indications)
+    ]:
+        needs.append(
+            f"{name} may not have {', '.join(unread)}: a session's table has no columns of other use"
+        )
+    lacking = {"data": "; ".join(needs)} if needs else {}
     if loads and not indications:  # cells that are read in units of force: which is which, no unit tells
         silent.append("every column is a force or a moment: which are indications, the file does not tell")
         loads = []

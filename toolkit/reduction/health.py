@@ -1,5 +1,5 @@
-"""What the rows of one recording show of its channels: dead, stuck and saturated ones, stray rows, a clock
-that does not run, and a tare that was recorded under load.
+"""What the rows of one recording show of its channels: dead, stuck, saturated and copied ones, stray rows, a
+clock that does not run, and a tare that was recorded under load.
 
 Nothing here asks for a calibration. A channel that the result reads makes its numbers unreliable, an error;
 of any other it is a warning, and the audit of an archive lists all as notes.
@@ -45,7 +45,8 @@ def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
     """Return what the channels of a recording show, as notes; nothing of its blocks is known.
 
     ``constant-channel``: a measured channel that never changes. ``saturated-channel``: rows that stand
-    exactly at a channel's largest or smallest value, more in a row than its digits explain. ``clock-jump``: a
+    exactly at a channel's largest or smallest value, more in a row than its digits explain.
+    ``copied-channel``: two measured channels that move alike in every row. ``clock-jump``: a
     time channel that runs backwards, stands still, or leaps by over ten of its steps.
     """
     if recording.rows < _FEW_ROWS:
@@ -62,6 +63,8 @@ def quality(recording: Recording, where: str) -> tuple[Finding, ...]:
                 rule, text = _stuck(channel, only_ends=True) or ("", None)
         if text is not None:
             findings.append(Finding(rule=rule, where=where, message=text, level="note"))
+    for text, _ in _copied(recording, [slice(0, recording.rows)]):
+        findings.append(Finding(rule="copied-channel", where=where, message=text, level="note"))
     return tuple(findings)
 
 
@@ -104,6 +107,11 @@ def health_findings(
                 add(*stuck, level)
         if settled and channel.role in _MEASURED and (text := _stray(channel, stretches)) is not None:
             add("stray-row", text, "error" if channel.role != "indication" else level)
+    for text, pair in _copied(recording, stretches):
+        counts = read is None or any(
+            channel.role != "indication" or channel.symbol in read for channel in pair
+        )
+        add("copied-channel", text, "error" if counts else "warning")
     if settled and (text := _repeated(recording, stretches)) is not None:
         add("constant-channel", text, "warning")
     counted_rows = [slice(0, recording.rows)] if counted else stretches
@@ -174,6 +182,39 @@ def _others_scatter(recording: Recording, channel: Series, stretches: Sequence[s
     # Whether another measured channel moves from row to row while this one stands still.
     channels = (c for c in recording.series if c.role in ("load", "indication") and c is not channel)
     return any(np.ptp(other.values[stretch]) > 0 for other in channels for stretch in stretches)
+
+
+def _copied(recording: Recording, stretches: Sequence[slice]) -> list[tuple[str, tuple[Series, Series]]]:
+    """Return which measured channels move alike in every row, in words and as a pair.
+
+    Each channel has an amplifier and a noise of its own: two whose steps agree to the last digit, or have the
+    other sign, in more rows than their digits explain are one signal. A simulation may have no noise.
+    """
+    if recording.simulated:
+        return []
+    steps = [
+        (channel, np.concatenate([np.diff(channel.values[stretch]) for stretch in stretches]))
+        for channel in recording.series
+        if channel.role in _MEASURED
+        if stretches
+    ]
+    found = []
+    for place, (one, of_one) in enumerate(steps):
+        for other, of_other in steps[place + 1 :]:
+            for sign, word in ((1, ""), (-1, " with the other sign")):
+                # Beside the digit of a channel its steps differ by the rounding of binary numbers alone.
+                room = 1e-9 * (np.max(np.abs(one.values)) + np.max(np.abs(other.values)))
+                if not len(of_one) or np.any(np.abs(of_one - sign * of_other) > room):
+                    continue
+                _, counts = np.unique(np.round(of_one / room) if room else of_one, return_counts=True)
+                alike = float(np.sum((counts / len(of_one)) ** 2))  # of two rows of independent channels
+                if alike ** len(of_one) <= _BY_CHANCE:
+                    text = (
+                        f"{one.header} and {other.header} move alike to the last digit in {len(of_one)} rows"
+                    )
+                    found.append((text + word, (one, other)))
+                    break
+    return found
 
 
 def _repeated(recording: Recording, stretches: Sequence[slice]) -> str | None:

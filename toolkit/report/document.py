@@ -31,7 +31,7 @@ from toolkit.report.content import (
     in_words_of,
     signature_text,
 )
-from toolkit.report.style import Style
+from toolkit.report.style import Style, kept
 from toolkit.report.vocabulary import Column, Entry, TableEntry, Vocabulary, columns_of
 
 Source = TypeVar("Source")
@@ -389,7 +389,7 @@ def printed_number(number: Number, entry: Entry, style: Style) -> Value:
     """
     unit_text, factor = style.unit(entry.unit)
     digits = style.digits(entry.path, unit_text)
-    spec = f".{digits}f" if digits is not None and entry.spec.endswith("f") else entry.spec
+    spec = f".{digits}f" if digits is not None and entry.spec.endswith("f") else kept(entry.spec, factor)
     if not isinstance(number, Estimate):
         return Value(
             kind="number", value=None if number is None else number * factor, unit=unit_text, spec=spec
@@ -407,7 +407,8 @@ def printed_table(declared: DeclaredTable[Source], rows: Rows, style: Style) -> 
         unit, factor = style.unit(column.unit)
         full = f"{declared.name}.{column.name}"
         digits = style.digits(full, column.name, unit)
-        spec = f".{digits}f" if digits is not None and column.spec.endswith("f") else column.spec
+        stated = digits is not None and column.spec.endswith("f")
+        spec = f".{digits}f" if stated else kept(column.spec, factor if column.quantity else 1.0)
         # Decimals by the column's full name rule; those by unit are for numbers without an uncertainty.
         U = column.U if style.digits(full) is None else None
         columns.append(replace(column, unit=unit, spec=spec, U=U))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -179,6 +180,22 @@ class Style:
         if preferred is None or preferred == head:
             return unit, 1.0
         return f"{preferred}{slash}{tail}", 1 / si_scale(preferred)
+
+
+def kept(spec: str, factor: float) -> str:
+    """Return the format of a number in a unit that its value was scaled to by a factor.
+
+    A declared format says how fine a value is in its own unit. In a larger one it has as many decimals more
+    as it takes that the last place is worth no more than five of the declared one's: loads of 1600 N and
+    2400 N are not both "2 kN".
+
+    >>> kept(".0f", 1e-3), kept(".0f", 1 / 4.448), kept(".1f", 1.0), kept(".3g", 1e-3)
+    ('.3f', '.0f', '.1f', '.3g')
+    """
+    declared = re.fullmatch(r"\.(\d+)f", spec)
+    if declared is None:
+        return spec
+    return f".{int(declared[1]) + max(0, math.ceil(-math.log10(5 * factor)))}f"
 
 
 def replace_terms(text: str, words: Mapping[str, str]) -> str:

@@ -15,6 +15,7 @@ from toolkit.calibration.registry import candidate, settled
 from toolkit.calibration.registry.candidate import calibrate, import_legacy
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.registry import Registry, load_checked
+from toolkit.errors import RegistryError
 from toolkit.lab.records.registry_answer import listed
 
 
@@ -80,3 +81,19 @@ def test_a_bad_record_leaves_the_others_usable(registry: Registry, make_session:
     good, bad = registry.usable("hub")
     assert [record.id for record in good] == ["hub-r1", "hub-r3"]
     assert [(refused.id, refused.rule) for refused in bad] == [("hub-r2", "data")]
+
+
+@pytest.mark.parametrize(
+    "name", ["../calibrations/hub", "/dev/null", "/", "..", "", "hub*", "h[u]b", "hub/", "x" * 300, "\0"]
+)
+def test_a_name_that_is_no_folder_of_the_registry_has_no_records(
+    name: str, registry: Registry, make_session: Callable[..., Path]
+) -> None:
+    """Names come from command lines, test.toml and machine definitions: none is a way out, or a pattern."""
+    calibrate(make_session(hub_data(40, 11), name="s11"), registry)
+    assert not registry.ledger(name).entries
+    assert registry.ledger("hub").entries
+    assert registry.digest(name) == registry.digest("another")
+    if name:
+        with pytest.raises(RegistryError, match="no such instrument"):
+            listed(registry, name, known_at=None, everything=True)

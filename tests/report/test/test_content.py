@@ -84,6 +84,13 @@ def test_units_by_choice() -> None:
     assert customary.values["summary.load"].value == pytest.approx(4897 / 4.4482216152605)
 
 
+def test_a_larger_unit_takes_no_digit_of_a_load_away() -> None:
+    kilo = content(style=Style(force="kN", decimal_comma=True))
+    assert kilo.plots["fy_vs_slip"].curves[0].label == f"{LOADS_N[0] / 1000:.3f} kN".replace(".", ",")
+    assert {c.name: c.spec for c in kilo.tables["stiffness"].columns}["load"] == ".3f"
+    assert kilo.values["summary.load"].spec == ".3f"
+
+
 def test_figures_against_load_read_the_fitted_curves() -> None:
     plot = content().plots["fy_vs_load"]
     curve = next(c for c in plot.curves if c.label == "±4 deg" and not c.open)

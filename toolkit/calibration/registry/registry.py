@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -31,6 +32,7 @@ from toolkit.trust.keys import Signer
 from toolkit.trust.signing import HERE, Signing, Travel
 
 ID = re.compile(r"(?P<instrument>[A-Za-z0-9][A-Za-z0-9_.-]*)-r(?P<number>[1-9][0-9]*)\Z")
+_LONGEST_NAME = 255  # bytes, of a folder: what every usual file system holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +121,8 @@ class Registry:
         TrustError
             ``people-log``
         """
+        if not _is_folder_name(instrument):
+            return Ledger(entries=(), damage=None)
         return self._judged(instrument, settled.read(self.folder / instrument), self.people())
 
     def people(self) -> PeopleLog:
@@ -206,7 +210,8 @@ class Registry:
         """
         people = self.people().history.now
         parts = [] if people is None else [f"{FOLDER} {people.sha256}"]
-        for name, data in settled.settled_files(self.folder / instrument):
+        folder = self.folder / instrument
+        for name, data in settled.settled_files(folder) if _is_folder_name(instrument) else ():
             if name != HEAD:
                 parts.append(f"{name} {sha256_bytes(decisions(data) if name == LEDGER else data)}")
         return sha256_bytes("\n".join(parts).encode())
@@ -342,6 +347,12 @@ class Registry:
             next_step="see 'toolkit calibration list'",
             rule="missing",
         )
+
+
+def _is_folder_name(instrument: str) -> bool:
+    """Tell whether a name stays in the registry: whoever names an instrument may write ``../x`` or ``/x``."""
+    named = instrument not in ("", ".", "..") and Path(instrument).name == instrument
+    return named and len(os.fsencode(instrument)) <= _LONGEST_NAME
 
 
 def record_ids(folder: Path, ledger: Ledger) -> tuple[str, ...]:

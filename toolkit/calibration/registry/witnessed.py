@@ -30,7 +30,7 @@ def witnessed(
     TrustError
         ``checkpoint``: what stands there is none
     """
-    for file, checkpoint in _checkpoints(calibrations, f"{name}-*"):
+    for file, checkpoint in _checkpoints(calibrations, f"{name}-"):
         if checkpoint.origin == f"{ORIGIN}{name}":  # else of an instrument whose name begins with this one's
             yield file.name, compare(lines(), checkpoint)
 
@@ -50,12 +50,13 @@ def contradicted(calibrations: Path, name: str, lines: Callable[[], Sequence[str
 def attested(calibrations: Path) -> frozenset[str]:
     """Return the names of the ledgers of which a witness has signed entries; the unreadable tell nothing."""
     try:
-        checkpoints = [checkpoint for _, checkpoint in _checkpoints(calibrations, "*")]
+        checkpoints = [checkpoint for _, checkpoint in _checkpoints(calibrations, "")]
     except (ToolkitError, OSError):
         return frozenset()
     return frozenset(point.origin.removeprefix(ORIGIN) for point in checkpoints if point.size)
 
 
-def _checkpoints(calibrations: Path, names: str) -> Iterator[tuple[Path, Checkpoint]]:
-    for file in sorted((calibrations.parent / "trust" / "witnessed").glob(f"{names}{SUFFIX}")):
-        yield file, parse_checkpoint(read_regular(file).decode(errors="replace"), where=file)
+def _checkpoints(calibrations: Path, start: str) -> Iterator[tuple[Path, Checkpoint]]:
+    for file in sorted((calibrations.parent / "trust" / "witnessed").glob(f"*{SUFFIX}")):
+        if file.name.startswith(start):  # a name is no pattern: whoever states it may write * and /
+            yield file, parse_checkpoint(read_regular(file).decode(errors="replace"), where=file)

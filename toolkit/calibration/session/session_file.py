@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from toolkit.calibration.records.record import Zero
 from toolkit.calibration.session.certificate import Certificate
-from toolkit.calibration.terms import INTERCEPT, NAME
+from toolkit.calibration.terms import INTERCEPT, NAME, NAME_FORM
 from toolkit.declared import (
     Above,
     AtLeast,
@@ -408,9 +408,8 @@ class SessionFile(StatedEntries, Fitted):
         if not INSTRUMENT.match(self.instrument):
             yield Fault(key=("instrument",), got=self.instrument, expected=INSTRUMENT_FORM)
         for key, names in (("indications", self.indications), ("loads", self.loads)):
-            if not all(NAME.match(name) for name in names):
-                expected = f'a list of names such as {key} = ["FY", "MZ"]'
-                yield Fault(key=(key,), got=names, expected=expected)
+            if unfit := [name for name in names if not NAME.match(name)]:
+                yield Fault(key=(key,), got=unfit, expected=NAME_FORM)
             if _RESERVED & set(names):
                 expected = "different names, none of them run, direction or rotation"
                 yield Fault(key=(key,), got=names, expected=expected)

@@ -289,7 +289,10 @@ def values_of(text: str, where: str = "--indications") -> dict[str, float]:
         try:
             value = float(number)
         except ValueError as error:
-            raise _wrong("an indication cannot be read", where, part, "NAME=NUMBER,...") from error
+            raise _wrong(
+                "an indication cannot be read", where, part, "NAME=NUMBER,...",
+                "write each number with a decimal point, and a comma between them alone",
+            ) from error  # fmt: skip
         if name.strip() in indications:
             raise _wrong("an indication is given twice", where, name.strip(), "each of them once")
         indications[name.strip()] = value

@@ -85,8 +85,9 @@ class Record(Face):
         Returns
         -------
         Loads
-            in N and N·m; U at 95 %, not determined for a legacy import. What an indication beyond the
-            calibrated range means for a row stands in its findings. Of a record whose zero is ``included``
+            in N and N·m; U at 95 %, not determined for a legacy import. Indications beyond the calibrated
+            range and a missing tare stand in its findings; zeros as ``tare`` state indications that are
+            tared already. Of a record whose zero is ``included``
             the budget with a tare is that without: the part that the tare takes away stays in it.
 
         Raises
@@ -128,7 +129,7 @@ class Record(Face):
             U=self._expanded(points) if uncertainty else {},
             index=getattr(data, "index", None),
             use=use,
-            findings=self._beyond(points),
+            findings=(*self._untared(zero is not None), *self._beyond(points)),
         )
 
     @checked
@@ -216,6 +217,26 @@ class Record(Face):
                 next_step="calibrate the instrument from a session",
             )  # fmt: skip
         return rows, stored_check(self.registry.folder, self.result)
+
+    def _untared(self, tared: bool) -> tuple[Finding, ...]:
+        """Return what a test without a tare is told, of indications without one.
+
+        A record of tared indications was never fitted to others: a warning. One whose zero is included holds
+        that of its session, which may have moved since: a note.
+        """
+        from toolkit.findings import Finding
+
+        if tared:
+            return ()
+        zero_included = self.result.zero == "included"
+        message = "no tare was stated: the zero of the cells stays in the loads, and no uncertainty holds it"
+        if not zero_included:
+            message += "; the record was fitted on tared indications"
+        return (
+            Finding(
+                rule="no-tare", where=self.id, message=message, level="note" if zero_included else "warning"
+            ),
+        )
 
     def _beyond(self, points: Array) -> tuple[Finding, ...]:
         from toolkit.findings import Finding

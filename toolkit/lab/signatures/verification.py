@@ -27,6 +27,7 @@ from toolkit.lab.signatures.proofs import (
     TESTED,
     Continuity,
     Ledger,
+    LedgerState,
     Named,
     anchor_in,
     day_of_test,
@@ -44,7 +45,10 @@ from toolkit.trust.seal.x509 import Trust
 from toolkit.trust.seal.xml import check_xml, content_hash
 
 _DCC = "{https://ptb.de/dcc}"
-_UNPROVED = "nothing proves that what it shows is what was issued; of what it names"
+_UNPROVED = "nothing proves that what it shows is what was issued"
+_NAMES_NOTHING = (
+    "it carries no record's hash and no proof to look up in a ledger, as documents issued by --issue do"
+)
 _BESIDE = ("*.pdf", "manifest.json")
 """What proves a file without a seal, in the same folder."""
 
@@ -382,14 +386,18 @@ def _verdict(
         return verdict
     if proof.broken is not None:
         return replace(verdict, why=proof.broken)
-    state = ledger(proof.names, proof.anchor)
+    if proof.names or proof.anchor:
+        state = ledger(proof.names, proof.anchor)
+    else:
+        state = LedgerState(why=_NAMES_NOTHING)
     time = "time as stated by the signer" if check.at and not check.stamped else ""
     # The records that bytes name may hold; that these are the bytes that were issued, nothing says.
     unproved = _UNPROVED if check.signature == "unsigned" and not entered else ""
+    of_names = "of what it names: " if unproved and proof.names else ""
     verdict = replace(
         verdict, signature=check.signature, ledger=state.ledger, still_holds=state.still_holds,
         untold=state.untold,
-        why="; ".join(part for part in (check.why, unproved, time, state.why) if part),
+        why="; ".join(part for part in (check.why, unproved, time, of_names + state.why) if part),
     )  # fmt: skip
     if entered and check.signature == "unsigned":
         return replace(

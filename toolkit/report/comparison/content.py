@@ -25,7 +25,7 @@ from toolkit.report.comparison.cells import (
 )
 from toolkit.report.content import Curve, Plot, ReportContent
 from toolkit.report.document import Document, Row, Rows, finding_table
-from toolkit.report.style import Style
+from toolkit.report.style import Style, kept
 from toolkit.report.tags import format_number
 from toolkit.units import printed
 from toolkit.version import __version__
@@ -238,7 +238,7 @@ def curve_differences(source: Compared, style: Style) -> Rows:
 
 def _load(load_N: float, style: Style) -> str:
     unit, factor = style.unit("N")
-    return f"{load_N * factor:.0f} {unit}"
+    return style.decimal(f"{load_N * factor:{kept('.0f', factor)}} {unit}")
 
 
 def _difference(row: Difference, style: Style) -> Row:
@@ -369,7 +369,7 @@ def _plot(comparison: Comparison, figure: Figure, drawn: Characteristic, style: 
             )
         )  # fmt: skip
         listed = ", ".join(
-            f"{plus_minus(b, c, decimal_comma=style.decimal_comma)} at {_number(a, style)}"
+            f"{plus_minus(b, c, decimal_comma=style.decimal_comma)} at {_number(a, load_factor, style)}"
             for a, b, c in zip(x, y, U, strict=True)
         )
         sentences.append(f"{entry.label}: {listed} {load_unit}")
@@ -412,5 +412,5 @@ def _series(entry: Entry, name: str) -> tuple[list[float], list[float], list[flo
     )
 
 
-def _number(value: float, style: Style) -> str:
-    return format_number(value, ".0f", decimal_comma=style.decimal_comma)
+def _number(value: float, factor: float, style: Style) -> str:
+    return format_number(value, kept(".0f", factor), decimal_comma=style.decimal_comma)

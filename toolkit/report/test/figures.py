@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.characteristics.catalogue import figures
 from toolkit.estimate import plus_minus
 from toolkit.report.content import Curve, Plot
-from toolkit.report.style import Style
+from toolkit.report.style import Style, kept
 from toolkit.report.tags import format_number
 from toolkit.report.test.content import REPORT, ReportedTest
 from toolkit.units import printed
@@ -89,12 +89,15 @@ class _Plots:
         unit, factor = self.style.unit("N" if channel in ("FY", "FZ") else "N*m")
         return printed(str(unit)), factor
 
-    def _number(self, value: float, spec: str = ".0f") -> str:
-        return format_number(value, spec, decimal_comma=self.style.decimal_comma)
+    def _number(self, value: float, spec: str = ".0f", factor: float = 1.0) -> str:
+        return format_number(value, kept(spec, factor), decimal_comma=self.style.decimal_comma)
+
+    def _ends(self, values: Sequence[float], factor: float) -> str:
+        return " to ".join(self._number(values[end], factor=factor) for end in (0, -1))
 
     def _load_text(self, load: float) -> str:
         unit, factor = self._scale("FZ")
-        return f"{self._number(load * factor)} {unit}"
+        return f"{self._number(load * factor, factor=factor)} {unit}"
 
     def _group(self, load: float) -> int:
         return min(range(len(self.loads)), key=lambda i: abs(self.loads[i] - load), default=0)
@@ -143,7 +146,7 @@ class _Plots:
                 label = self._load_text(load)
                 curves.append(_curve(label, x, y, index, "points", open_=rotation == "reverse"))
                 sentences.append(
-                    f"{label} {rotation}: {self._number(y[0])} to {self._number(y[-1])} {unit} "
+                    f"{label} {rotation}: {self._ends(y, factor)} {unit} "
                     f"from {self._number(x[0], '.1f')} to {self._number(x[-1], '.1f')} deg"
                 )
                 fit = self._fit(rotation, load, channel)
@@ -206,7 +209,7 @@ class _Plots:
                     continue
                 x, y, U = zip(*points, strict=True)
                 curves.append(_curve(f"±{size} deg", x, y, index, "both", open_=angle < 0, error=U))
-                sentences.append(f"{angle:+d} deg: {self._number(y[0])} to {self._number(y[-1])} {unit}")
+                sentences.append(f"{angle:+d} deg: {self._ends(y, factor)} {unit}")
         symbol = _SYMBOLS[channel]
         return self._plot(
             f"{channel.lower()}_vs_load",
@@ -277,18 +280,19 @@ class _Plots:
     ) -> Plot | None:
         """Characteristics of one figure against load: (label, what it is, its rows)."""
         first = series[0][1]
-        style_unit, factor = self.style.unit(first.printed_unit)
-        unit, load_unit = printed(str(style_unit)), self._scale("FZ")[0]
-        factor *= first.factor
+        style_unit, style_factor = self.style.unit(first.printed_unit)
+        unit, (load_unit, load_factor) = printed(str(style_unit)), self._scale("FZ")
+        factor = style_factor * first.factor
         curves, listed = [], []
         for index, (label, declared, rows) in enumerate(series):
             x, y, u = self._series(rows, factor)
             if not x:
                 continue
             curves.append(_curve(label, x, y, index, "both", error=u, open_="reverse" in label))
-            spec = f".{declared.digits}f"
+            spec = kept(f".{declared.digits}f", style_factor)
             values = ", ".join(
-                f"{plus_minus(b, c, spec=spec, decimal_comma=self.style.decimal_comma)} at {self._number(a)}"
+                plus_minus(b, c, spec=spec, decimal_comma=self.style.decimal_comma)
+                + f" at {self._number(a, factor=load_factor)}"
                 for a, b, c in zip(x, y, u, strict=True)
             )
             listed.append(f"{label}: {values} {load_unit}")

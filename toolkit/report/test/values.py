@@ -14,7 +14,7 @@ from toolkit.machine import load_machine
 from toolkit.machine.default import DEFAULT_MACHINE
 from toolkit.report.content import Value
 from toolkit.report.document import DeclaredValue, printed_number
-from toolkit.report.style import Style
+from toolkit.report.style import Style, kept
 from toolkit.report.tags import format_number
 from toolkit.report.test.characteristics import summary_estimates, summary_load
 from toolkit.report.test.content import REPORT, ReportedTest, report_id
@@ -40,7 +40,10 @@ def _scaled(value: float | None, factor: float) -> float | None:
 
 def _loads(t: ReportedTest, style: Style) -> str | None:
     unit, factor = style.unit("N")
-    loads = [format_number(load * factor, ".0f") for load, _ in load_groups(t.used)]
+    loads = [
+        format_number(load * factor, kept(".0f", factor), decimal_comma=style.decimal_comma)
+        for load, _ in load_groups(t.used)
+    ]
     return f"{', '.join(loads)} {unit}" if loads else None
 
 
