@@ -42,7 +42,7 @@ from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged, weighted
 from toolkit.estimate import Estimate
-from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
+from toolkit.tires.evaluate import estimate_at, slope_at, value_at, zero_crossing
 from toolkit.tires.models import model
 
 UNIT = {"FY": "N", "MZ": "N*m"}
@@ -124,7 +124,7 @@ class Reader:
         gradient = model(fit.model).jacobian(fit.values, SA)
         return _Reading(
             channel=channel,
-            estimate=estimate_at(fit, SA),
+            estimate=(fit.value_at_zero if SA == 0.0 else None) or estimate_at(fit, SA),
             weights=self._weights(channel, gradient),
             angle=tuple(self.shared.angle_parts(slope, slope * SA)),
             at=SA,
@@ -136,7 +136,7 @@ class Reader:
         if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
             return None
         gradient = model(fit.model).slope_jacobian(fit.values, 0.0)
-        estimate = slope_estimate_at(fit, 0.0)
+        estimate = fit.slope_at_zero
         # A zero of the slip angle moves along the curve to where its slope is another one.
         step = 1e-4
         bend = (float(slope_at(fit, step)) - float(slope_at(fit, -step))) / (2 * step)

@@ -249,8 +249,8 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
 
 
 def _missed(directions: Sequence[Direction]) -> dict[tuple[Channel, float], float]:
-    # What is left of the conditions about the curves of a load, of the load where most is left. Conditions that
-    # lie on their curves, of a test that is yet to be made, leave what their size leaves.
+    # What is left of the conditions about the curves of a load, of the load where most is left. Where all
+    # lie on their curves, in a test that is yet to be made, it goes with their size.
     squares: dict[tuple[Channel, float], list[float]] = {}
     for direction in directions:
         for channel in CHANNELS:
