@@ -124,7 +124,7 @@ class Reader:
         gradient = model(fit.model).jacobian(fit.values, SA)
         return _Reading(
             channel=channel,
-            estimate=(fit.value_at_zero if SA == 0.0 else None) or estimate_at(fit, SA),
+            estimate=estimate_at(fit, SA),
             weights=self._weights(channel, gradient),
             angle=tuple(self.shared.angle_parts(slope, slope * SA)),
             at=SA,
@@ -136,7 +136,8 @@ class Reader:
         if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
             return None
         gradient = model(fit.model).slope_jacobian(fit.values, 0.0)
-        estimate = fit.slope_at_zero
+        # The value is that of the curve, whose parameters a search may have moved.
+        estimate = replace(fit.slope_at_zero, value=float(slope_at(fit, 0.0)))
         # A zero of the slip angle moves along the curve to where its slope is another one.
         step = 1e-4
         bend = (float(slope_at(fit, step)) - float(slope_at(fit, -step))) / (2 * step)
