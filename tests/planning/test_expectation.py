@@ -32,9 +32,8 @@ PLAN = Design(
 
 
 def test_what_an_expected_test_says_of_its_scatter_is_the_scatter() -> None:
-    expected = VARIANCES + np.array(
-        [0.0, 0.0, 0.0, 0.0, 2.0**2, 0.04**2, np.radians(0.003) ** 2, 4.0**2, 0.1**2]
-    )
+    beside = [2.0**2, 0.04**2, np.radians(0.003) ** 2, 4.0**2, 0.1**2, np.radians(0.004) ** 2]
+    expected = VARIANCES + np.array([0.0, 0.0, 0.0, 0.0, *beside])
     found = scatter_of(earlier().directions(PROTOCOL), expected=expected)
     np.testing.assert_allclose(found.variances, expected, rtol=1e-6)
 

@@ -253,8 +253,8 @@ class Reader:
             scatter, dof = self.scatter.of(self.direction, weights)
             pool = f"scatter/{shared.test}"
             form = [
-                Part(source="fit", key=f"form/{shared.test}/{e.channel}/{e.place}", u=e.share, dof=e.dof,
-                     pool=f"form/{shared.test}/{e.channel}")
+                Part(source="fit", key=f"form/{shared.test}/{e.source}/{e.place}", u=e.share, dof=e.dof,
+                     pool=f"form/{shared.test}/{e.source}")
                 for e in self.scatter.form(
                     self.direction, weights, None if first.at is None else (channel, first.at)
                 )

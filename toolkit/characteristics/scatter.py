@@ -1,4 +1,4 @@
-"""How conditions scatter about the curves of a test: nine variances, by restricted likelihood.
+"""How conditions scatter about the curves of a test: ten variances, by restricted likelihood.
 
 The rows of a block say how sure their own mean is, and no more: a drum's run-out that the filter delays, a
 load that creeps, a steering that comes to rest elsewhere are the same in every row of the block. They differ
@@ -11,14 +11,15 @@ the steering, a zero of the channels that moves from file to file and where the 
 same at all loads of the rest: a further a for FY and for MZ, and a further c. What the form of the curves
 misses at a slip angle is the same at all loads and in both directions, but for its size, which goes with what
 is left about the curves of the load, and but for its sign at the slip angle's other side: a tire answers both
-sides alike, its pull apart. That is a last a for FY and for MZ. Without it a moment that no Magic Formula
-follows passes for slip angles that are wrong in just those ways that the curve of FY takes up, and conicity
-for ten times as unsure as it is; it cancels in what is read at zero slip, and adds up in a slope. The
-variances are those of the largest restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of
-the residuals of all curves at once, by scoring with non-negative variances; a single curve has seven degrees
-of freedom and its own variance says little. At zero slip FY hardly follows the load, and an error of the load
-is not taken for one of conicity. Degrees of freedom are Satterthwaite's, from the information on the
-variances: of what all loads of a rest share, the residuals of further loads say little that is new.
+sides alike, its pull apart. That is a last a for FY and for MZ, and a last c: a brush bends elsewhere than a
+Magic Formula, in both. Without them a moment that no Magic Formula follows passes for rests at slip angles
+that are wrong in just those ways that the curve of FY takes up, and conicity for ten times as unsure as it
+is; they cancel in what is read at zero slip, and add up in a slope. The variances are those of the largest
+restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of the residuals of all curves at
+once, by scoring with non-negative variances; a single curve has seven degrees of freedom and its own variance
+says little. At zero slip FY hardly follows the load, and an error of the load is not taken for one of
+conicity. Degrees of freedom are Satterthwaite's, from the information on the variances: of what all loads of
+a rest share, the residuals of further loads say little that is new.
 """
 
 from __future__ import annotations
@@ -36,20 +37,13 @@ from toolkit.reduction.common_load import at_one_angle, slopes
 from toolkit.tires.evaluate import slope_at, value_at
 from toolkit.tires.models import model
 
-_SOURCES = 9
-_CHANNEL = (
-    0,
-    1,
-    4,
-    5,
-    7,
-    8,
-)  # the sources that are errors of a channel; the others are of load and slip angle
-_OF_REST = (4, 5, 6)  # the sources that all loads of a rest share
-_OF_FORM = (
-    7,
-    8,
-)  # those that all loads and both directions share at a slip angle; the others are of single blocks
+_SOURCES = 10
+# Sources that are errors of a channel; the others are of load and slip angle.
+_CHANNEL = (0, 1, 4, 5, 7, 8)
+# Those that all loads of a rest share, and that all loads and both directions share at a slip angle; the
+# others are of single blocks.
+_OF_REST = (4, 5, 6)
+_OF_FORM = (7, 8, 9)
 _ENOUGH = 24  # residual freedoms from which on the variances of load and slip angle are told apart
 _STEPS, _SETTLED = 60, 1e-6
 _ON_CURVE = 1e-9  # of max|y|
@@ -81,9 +75,9 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormError:
-    """Signed share in a value [its unit] of what the form of a channel's curves misses at a slip angle."""
+    """Signed share in a value [its unit] of what the form of the curves misses at a slip angle."""
 
-    channel: Channel
+    source: int
     place: int
     share: float
     dof: float
@@ -91,9 +85,9 @@ class FormError:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scatter:
-    """Variances (9,) of the sources of `Sensitivity` and their covariance (9, 9).
+    """Variances (10,) of the sources of `Sensitivity` and their covariance (10, 10).
 
-    Units are N², N²m², N², rad², then N², N²m², rad², then N², N²m². ``directions`` has the sensitivities of
+    Units are N², N²m², N², rad², then N², N²m², rad² twice. ``directions`` has the sensitivities of
     each direction by its load and rotation.
     """
 
@@ -121,19 +115,19 @@ class Scatter:
         in the tire, and its want in the curve.
         """
         sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
-        for source, channel in zip(_OF_FORM, CHANNELS, strict=True):
+        for source in _OF_FORM:
             variance = float(self.variances[source])
-            if variance <= 0 or channel not in weights:
+            if variance <= 0:
                 continue
             spread = float(self.covariance[source, source])
             dof = max(2 * variance**2 / spread, 1.0) if spread > 0 else np.inf
-            moved = weights[channel] * sensitivity.by_channel[channel][source]
-            if at is not None and at[0] == channel:
+            moved = np.sum([w * sensitivity.by_channel[c][source] for c, w in weights.items()], axis=0)
+            if at is not None:
                 nearest = int(np.argmin(np.abs(direction.group.SA - at[1])))
-                moved[nearest] -= sensitivity.by_channel[channel][source, nearest]
+                moved[nearest] -= sensitivity.by_channel[at[0]][source, nearest]
             shares = np.bincount(sensitivity.places, moved) * np.sqrt(variance)
             for place in np.unique(sensitivity.places).tolist():
-                yield FormError(channel=channel, place=place, share=float(shares[place]), dof=dof)
+                yield FormError(source=source, place=place, share=float(shares[place]), dof=dof)
 
     def each(self, direction: Direction, channel: Channel) -> Array:
         """Return the variance of each condition of a direction as it was measured (conditions,)."""
@@ -152,7 +146,9 @@ class Scatter:
 
 def of_one_block(variances: Array) -> Array:
     """Return the variances of FY [N²], MZ [N²m²], load [N²] and slip angle [rad²] of one block (4,)."""
-    of_rest = np.array([variances[4] + variances[7], variances[5] + variances[8], 0.0, variances[6]])
+    of_rest = np.array(
+        [variances[4] + variances[7], variances[5] + variances[8], 0.0, variances[6] + variances[9]]
+    )
     return np.asarray(variances[:4] + of_rest)
 
 
@@ -174,7 +170,7 @@ def scatter_of(directions: Sequence[Direction], *, expected: Array | None = None
 
     Parameters
     ----------
-    expected : variances of the sources (9,) of a test that is yet to be made: what it will say of them, on
+    expected : variances of the sources (10,) of a test that is yet to be made: what it will say of them, on
         average, in place of what the residuals say
     """
     sensitivities = _sensitivities(directions)
@@ -236,6 +232,7 @@ def _sensitivities(directions: Sequence[Direction]) -> dict[tuple[float, str], S
             moved[7 + index] = missed[channel, direction.group.load_N] * sides
             moved[2] = [by_load[channel][id(direction), place] for place in range(len(SA))]
             moved[3] = moved[6] = 0.0 if fit is None else slope_at(fit, SA)
+            moved[9] = moved[6] * sides
             rows[channel] = moved
         sensitivities[direction.group.load_N, direction.group.rotation] = Sensitivity(
             by_channel=rows,
@@ -288,13 +285,13 @@ def _scale(directions: Sequence[Direction], sensitivities: Mapping[tuple[float, 
         for k in (2, 3)
     ]
     load, angle = (size[0] / slope if slope else 1.0 for slope in steep)
-    return np.array([*size, load, angle, *size, angle, *size])
+    return np.array([*size, load, angle, *size, angle, *size, angle])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Residuals:
     # Of one rotation, in the space that its curves leave: residuals (f,), what its rows and the way to the
-    # common load explain (f, f), and what each source would (9, f, f); values in parts of max|y|. Of a test
+    # common load explain (f, f), and what each source would (10, f, f); values in parts of max|y|. Of a test
     # that is yet to be made the columns of z are those of a root of the residuals' covariance.
     z: tuple[Array, ...]
     rows: Array
@@ -350,7 +347,7 @@ class _Residuals:
 
 
 def _restricted(curves: Sequence[_Residuals], free: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the variances of the largest restricted likelihood (9,) and their covariance (9, 9)."""
+    """Return the variances of the largest restricted likelihood (10,) and their covariance (10, 10)."""
     from scipy.optimize import nnls
 
     variances, covariance = np.zeros(_SOURCES), np.zeros((_SOURCES, _SOURCES))
