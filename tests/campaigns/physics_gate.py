@@ -91,7 +91,7 @@ def reduced(test: VirtualTest, record: CalibrationRecord, edit: Edit | None = No
         machine=machine,
         record=record,
         recordings=recordings,
-        tare=Tare(source="test.toml", values=test.tare, unit=test.tare_unit),
+        tare=Tare(source="test.toml", values=test.tare, unit=test.tare_unit, u=test.tare_u),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -98,3 +99,35 @@ def test_what_all_loads_of_a_file_share_has_the_freedoms_of_one_load(cause: str,
         drawn = 8.0 if cause == "channel" else np.radians(0.05) * slope
         low, high = np.sqrt(chi2.ppf([1e-4, 1 - 1e-4], 14) / 14)
         assert low < u / np.linalg.norm(drawn * weights["FY"]) < high
+
+
+def test_what_the_form_of_a_moment_misses_is_no_error_of_the_force() -> None:
+    """A wave in MZ over the slip angle, odd, the same in all loads and directions: no Magic Formula has it.
+
+    FY lies on its curves: nothing of the wave may be told as an error of the slip angle, which would move FY
+    by 60 kN/rad. What is read of MZ at zero slip is as sure as without it, for the wave is none there.
+    """
+    base = reduced_test(loads=THREE, u=(0.5, 0.01))
+    waved = dataclasses.replace(base, conditions=tuple(
+        dataclasses.replace(
+            c,
+            MZ_common=c.MZ_common + 0.8 * (c.FZ / LOAD) ** 2 * math.sin(126.0 * (c.step_SA or 0.0)),
+        )
+        for c in base.conditions
+    ))  # fmt: skip
+    found, directions = scatter(waved)
+    assert found.variances[8] > 0
+    for one in directions:
+        assert np.sqrt(found.each(one, "FY")).max() < 0.5
+    u = {
+        name: row.estimate.u
+        for name in ("CRAT", "conicity")
+        if (row := characterise(waved, machine=M15, record=None).at(name, LOAD, "both")) is not None
+        and row.estimate is not None
+    }
+    plain = characterise(base, machine=M15, record=None)
+    for name, value in u.items():
+        row = plain.at(name, LOAD, "both")
+        assert row is not None
+        assert row.estimate is not None
+        assert value < 3 * row.estimate.u

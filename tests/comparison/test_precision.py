@@ -12,8 +12,9 @@ import pytest
 from scipy import stats
 
 from tests.comparison.comparison_factory import conicity
+from tests.coverage import repeats as drawn_repeats
 from toolkit.comparison.differences import grubbs_p
-from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread
+from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread, total_spread
 
 
 def test_gum_h5_zener_voltage_standard() -> None:
@@ -181,3 +182,33 @@ def test_a_repeat_that_stands_apart_is_named_and_kept() -> None:
     assert (note.where, note.level) == ("t3", "note")
     assert found.repeats is not None
     assert all(one.n == 8 and one.outlier and one.farthest == "t3" for one in found.repeats.precisions)
+
+
+@pytest.mark.parametrize("plan", drawn_repeats.PLANS, ids=lambda plan: plan.name)
+def test_the_spread_of_all_tests_holds_what_a_factor_adds(plan: drawn_repeats.Plan) -> None:
+    """As independent tests the intervals of clustered ones held the true spread in 59 to 80 of 100."""
+    for row in drawn_repeats.rows_of(plan, 400, seed=13):
+        # Exact binomial limits of 400 draws at one chance in a thousand, to either side of 95 %.
+        assert stats.binom.ppf(5e-4, row.n, 0.95) <= row.covered <= stats.binom.ppf(1 - 5e-4, row.n, 0.95), (
+            row
+        )
+
+
+def test_the_spread_of_tests_that_share_no_level_is_that_of_chi_square() -> None:
+    values = np.array([1.0, 2.0, 4.0, 8.0])
+    assert total_spread(values, [("a", "b", "c", "d")]) == spread(float(values.std(ddof=1)), 3)
+    assert total_spread(values, []) == spread(float(values.std(ddof=1)), 3)
+
+
+def test_the_interval_of_a_balanced_plan_by_hand() -> None:
+    """Two days of two tests each: 4 and 6, 8 and 12. Mean squares 50/2 and 10/2 about means 5 and 10.
+
+    The variance of the means is 12.5, that within 5: 15 in all. With chi-square of one and two degrees of
+    freedom at 0.025 and 0.975 the two limits follow from G = 1 - n/upper and H = n/lower - 1.
+    """
+    found = total_spread(np.array([4.0, 6.0, 8.0, 12.0]), [("1", "1", "2", "2")])
+    upper, lower = stats.chi2.ppf(0.975, [1, 2]), stats.chi2.ppf(0.025, [1, 2])
+    G, H = 1 - np.array([1, 2]) / upper, np.array([1, 2]) / lower - 1
+    parts = np.array([12.5, 2.5])
+    assert found.low == pytest.approx(math.sqrt(15 - math.hypot(*(G * parts))))
+    assert found.high == pytest.approx(math.sqrt(15 + math.hypot(*(H * parts))))

@@ -1,8 +1,9 @@
 """`make coverage`: how often the intervals that the toolkit prints hold the truth, by simulation.
 
-The tables are those of `docs/coverage.md`: calibration sessions, characteristics of whole virtual tests,
-parameters of the Magic Formula and of its combined slip, and sound rows that are left alone. Nothing here
-asserts; a small seeded part runs with the tests.
+The tables are those of `docs/coverage.md`: calibration sessions, characteristics of whole virtual tests and
+of tests that another made, single curves, parameters of the Magic Formula and of its combined slip, sound
+rows that are left alone, and spreads of repeats. Nothing here asserts; a small seeded part runs with the
+tests.
 """
 
 from __future__ import annotations
@@ -11,15 +12,29 @@ import argparse
 import sys
 import time
 
-from tests.coverage import calibration, characteristics, combined_slip, magic_formula, sound_rows
+from tests.coverage import (
+    calibration,
+    characteristics,
+    combined_slip,
+    foreign_tests,
+    hubs,
+    magic_formula,
+    repeats,
+    single_curves,
+    sound_rows,
+)
 from tests.coverage.rows import as_table
 
 TABLES = {
     "calibration": calibration.table,
+    "hubs": hubs.table,
     "characteristics": characteristics.table,
+    "foreign-tests": foreign_tests.table,
+    "single-curves": single_curves.table,
     "magic-formula": magic_formula.table,
     "combined-slip": combined_slip.table,
     "sound-rows": sound_rows.table,
+    "repeats": repeats.table,
 }
 
 

@@ -134,7 +134,7 @@ def drawn_test(
     """Return a test of a plan with every error drawn that the machine's instruments are stated to have."""
     test = simulate(plan)
     drawn = _Drawn.of(machine, plan.pressure_Pa, rng)
-    tare = Tare(source="test.toml", values=test.tare, unit=test.tare_unit)
+    tare = Tare(source="test.toml", values=test.tare, unit=test.tare_unit, u=test.tare_u)
     return reduce_test(
         info=TestInfo(name="coverage", machine=MACHINE.name, pressure_Pa=plan.pressure_Pa, simulated=True),
         machine=machine,

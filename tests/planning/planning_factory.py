@@ -15,7 +15,7 @@ from toolkit.planning.expectation import EarlierTest, earlier_test
 LOADS = tuple(M15.protocol.loads_N)
 # Of one condition: of its rows [N, N·m], and beyond them FY, MZ, load [N], slip angle [rad]; none of a rest.
 ROWS = (2.0, 0.05)
-VARIANCES = np.array([3.0**2, 0.06**2, 1.0**2, np.radians(0.002) ** 2, 0.0, 0.0, 0.0])
+VARIANCES = np.array([3.0**2, 0.06**2, 1.0**2, np.radians(0.002) ** 2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @functools.cache

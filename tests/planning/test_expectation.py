@@ -32,7 +32,8 @@ PLAN = Design(
 
 
 def test_what_an_expected_test_says_of_its_scatter_is_the_scatter() -> None:
-    expected = VARIANCES + np.array([0.0, 0.0, 0.0, 0.0, 2.0**2, 0.04**2, np.radians(0.003) ** 2])
+    beside = [2.0**2, 0.04**2, np.radians(0.003) ** 2, 4.0**2, 0.1**2, np.radians(0.004) ** 2]
+    expected = VARIANCES + np.array([0.0, 0.0, 0.0, 0.0, *beside])
     found = scatter_of(earlier().directions(PROTOCOL), expected=expected)
     np.testing.assert_allclose(found.variances, expected, rtol=1e-6)
 
@@ -54,7 +55,7 @@ def drawn(design: Design, seed: int) -> TestResult:
     noisy = []
     for place, condition in enumerate(bare.conditions):
         by_channel = moved[round(condition.FZ), condition.rotation]
-        z = rng.standard_normal(7) * np.sqrt(VARIANCES)
+        z = rng.standard_normal(len(VARIANCES)) * np.sqrt(VARIANCES)
         rows = rng.standard_normal(2) * ROWS
         FY = condition.FY + float(by_channel["FY"][:, place % len(degrees)] @ z) + rows[0]
         MZ = condition.MZ + float(by_channel["MZ"][:, place % len(degrees)] @ z) + rows[1]

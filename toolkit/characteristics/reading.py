@@ -42,7 +42,7 @@ from toolkit.characteristics.scatter import Scatter, weights_of
 from toolkit.characteristics.shared_errors import SharedErrors
 from toolkit.characteristics.uncertain import Part, Uncertain, merged, weighted
 from toolkit.estimate import Estimate
-from toolkit.tires.evaluate import estimate_at, slope_at, slope_estimate_at, value_at, zero_crossing
+from toolkit.tires.evaluate import estimate_at, slope_at, value_at, zero_crossing
 from toolkit.tires.models import model
 
 UNIT = {"FY": "N", "MZ": "N*m"}
@@ -51,11 +51,14 @@ UNIT = {"FY": "N", "MZ": "N*m"}
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Reading:
     # One channel's reading: its value with the u of the curve's own covariance, d reading / d condition, and
-    # what the slip angle's zero and scale do to it.
+    # what the slip angle's zero and scale do to it. Off the curve it has the errors of the curve's form, as
+    # they are at the slip angle ``at`` [rad] where it is a value there.
     channel: Channel
     estimate: Estimate
     weights: Array
     angle: tuple[Part, ...]
+    off_curve: bool = True
+    at: float | None = None
 
 
 class Reader:
@@ -124,6 +127,7 @@ class Reader:
             estimate=estimate_at(fit, SA),
             weights=self._weights(channel, gradient),
             angle=tuple(self.shared.angle_parts(slope, slope * SA)),
+            at=SA,
         )
 
     def slope(self, channel: Channel) -> Uncertain | None:
@@ -132,7 +136,8 @@ class Reader:
         if fit is None or "slope_at_zero" in fit.not_determined or fit.slope_at_zero is None:
             return None
         gradient = model(fit.model).slope_jacobian(fit.values, 0.0)
-        estimate = slope_estimate_at(fit, 0.0)
+        # The value is that of the curve, whose parameters a search may have moved.
+        estimate = replace(fit.slope_at_zero, value=float(slope_at(fit, 0.0)))
         # A zero of the slip angle moves along the curve to where its slope is another one.
         step = 1e-4
         bend = (float(slope_at(fit, step)) - float(slope_at(fit, -step))) / (2 * step)
@@ -178,7 +183,9 @@ class Reader:
             parts.append(self._own(channel, "slip angle scatter", "secant", u))
         u = _norm(weights * self.group.own_u(channel)) / span
         estimate = Estimate(value=slope, u=u, unit=f"{UNIT[channel]}/rad")
-        reading = _Reading(channel=channel, estimate=estimate, weights=weights / span, angle=tuple(parts))
+        reading = _Reading(
+            channel=channel, estimate=estimate, weights=weights / span, angle=tuple(parts), off_curve=False
+        )
         return self._read(reading, "secant")
 
     def _chord(self, channel: Channel) -> Uncertain | None:
@@ -241,9 +248,18 @@ class Reader:
         weights = {term.channel: factor * term.weights for factor, term in terms}
         rows = _norm(np.concatenate([w * self.group.own_u(c) for c, w in weights.items()]))
         tares = _norm(np.concatenate([w * self._tares[c] for c, w in weights.items()]))
+        form: list[Part] = []
         if self.scatter is not None and all(self.direction.curve(c) is not None for c in weights):
             scatter, dof = self.scatter.of(self.direction, weights)
             pool = f"scatter/{shared.test}"
+            form = [
+                Part(source="fit", key=f"form/{shared.test}/{e.source}/{e.place}", u=e.share, dof=e.dof,
+                     pool=f"form/{shared.test}/{e.source}")
+                for e in self.scatter.form(
+                    self.direction, weights, None if first.at is None else (channel, first.at)
+                )
+                if first.off_curve
+            ]  # fmt: skip
         else:
             # The fit's residuals hold the scatter of the rows already; where a curve follows its points more
             # closely than their own scatter allows, the scatter stands. Never both.
@@ -258,6 +274,7 @@ class Reader:
         parts += [replace(part, u=factor * part.u) for factor, term in terms for part in term.angle]
         parts.append(self._own(channel, "repeatability", reading, rows))
         parts.append(replace(self._own(channel, "fit", reading, scatter, dof), pool=pool))
+        parts += form
         return Uncertain(value=first.estimate.value, unit=first.estimate.unit, parts=merged(parts))
 
     def _own(self, channel: str, source: str, reading: str, u: float, dof: float = np.inf) -> Part:

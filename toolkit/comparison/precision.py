@@ -7,9 +7,10 @@ variance with unequal cells: with n_i tests in level i of p levels and N in all,
     n_0   = (N - sum n_i^2 / N) / (p - 1)
     s_b^2 = max(0, (MS_between - s_w^2) / n_0)
 
-and the intermediate precision with that factor different is sqrt(s_w^2 + s_b^2). A factor is told apart from
-another only where they did not change together; repeatability needs two tests of the same day, operator,
-mounting, calibration, machine and laboratory. Reproducibility needs another laboratory.
+and the intermediate precision with that factor different is sqrt(s_w^2 + s_b^2). The interval of the spread
+of all tests counts what tests of one level share (`total_spread`). A factor is told apart from another only
+where they did not change together; repeatability needs two tests of the same day, operator, mounting,
+calibration, machine and laboratory. Reproducibility needs another laboratory.
 
 Mandel's statistics tell which laboratory lies apart, and which scatters more than the others (5725-2, 7.3.1):
 
@@ -127,7 +128,7 @@ def _precision(
         load_N=load_N,
         n=len(values),
         mean=float(values.mean()),
-        total=spread(float(values.std(ddof=1)), len(values) - 1),
+        total=total_spread(values, [factor.levels for factor in varied]),
         repeatability=repeatability,
         limit_r=1.96 * math.sqrt(2.0) * repeatability.value if repeatability else None,
         factors=tuple(factor_spread(values, factor.levels, factor=factor.name) for factor in varied),
@@ -211,6 +212,41 @@ def _decided(precisions: Sequence[Precision], level: float) -> tuple[Precision, 
         )
         for i, row in enumerate(precisions)
     )
+
+
+def total_spread(values: Array, factors: Sequence[Sequence[Hashable]]) -> Spread:
+    """Return the standard deviation of tests (tests,) with the interval of what a test of any level scatters.
+
+    Tests of one level of a factor share what the level adds: they are fewer than they look. The interval is
+    that of s_w^2 + s_b^2 for unequal cells by the modified large-sample method (Burdick and Graybill,
+    Confidence Intervals on Variance Components, 1992), with the variance of the levels' means and their
+    harmonic mean size; of several factors, the widest to either side.
+
+    Parameters
+    ----------
+    factors : levels of each factor (tests,)
+    """
+    from scipy.special import chdtri
+
+    N = len(values)
+    alone = spread(float(values.std(ddof=1)), N - 1)
+    off = deviations(values)
+    ends = []
+    for levels in factors:
+        cells = [off[[entry == level for entry in levels]] for level in dict.fromkeys(levels)]
+        p = len(cells)
+        if not 1 < p < N:
+            continue
+        within, inside = _within(values, levels)
+        harmonic = p / sum(1 / len(cell) for cell in cells)
+        parts = np.array([np.var([cell.mean() for cell in cells], ddof=1), (1 - 1 / harmonic) * within])
+        dofs = np.array([p - 1, inside])
+        below, above = 1 - dofs / chdtri(dofs, 0.025), dofs / chdtri(dofs, 0.975) - 1
+        low = float(parts.sum() - np.linalg.norm(below * parts))
+        ends.append((math.sqrt(max(low, 0.0)), math.sqrt(float(parts.sum() + np.linalg.norm(above * parts)))))
+    if not ends:
+        return alone
+    return replace(alone, low=min(low for low, _ in ends), high=max(high for _, high in ends))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

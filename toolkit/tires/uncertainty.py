@@ -111,6 +111,8 @@ _STRAIGHT = (0.25, 6.0)  # the same at the usual shape, where a parameter may be
 _LEAST_RISE = 1e-2  # of it: an end goes no further out at once
 _INSIDE = 0.98  # normalised: SA = 0 must lie between the rows
 _REFITS = 2  # steps by which all else is fitted again where one parameter is held
+_REFITS_AT_ZERO = 4  # the same where slope or value at SA = 0 is held, which bends more
+_HELD = 10.0  # how much an end that is missed by half a width weighs beside the cost
 _WIDE = 0.5  # half width of an interval, of what is natural: beyond, the data say next to nothing
 _IDLE = 1.0  # the same at the estimate: beyond, an interval says nothing
 
@@ -204,6 +206,19 @@ def spread(solution: Solution, problems: Problems, *, zero: Array, noise: Noise)
     # would pass three quarters cover.
     determined &= (np.abs(zero) <= _INSIDE)[:, None]
     closed &= (np.abs(zero) <= _INSIDE)[:, None, None]
+    reach = factor[:, 6:] * np.stack([slope_se, value_se], axis=1)
+    held = _rise_at_zero(theta, alone, gradients.transpose(1, 0, 2), reach, zero, coarse, low, high)
+    at_rivals = np.where(
+        rival[..., 0],
+        np.stack([
+            slope(solution.rivals.transpose(2, 0, 1), zero[:, None]) - at_zero[:, None],
+            value(solution.rivals.transpose(2, 0, 1), zero[:, None]) - level[:, None],
+        ]),
+        0.0,
+    )  # fmt: skip
+    # One half width serves both sides: the longer one.
+    longest = np.maximum(*_sides(reach, held, np.moveaxis(at_rivals, 0, 2)))
+    slope_se, value_se = (longest / factor[:, 6:]).T
     # Beyond the data a curve is an extrapolation of the model, whatever its covariance says.
     # Slope and value need rows on both sides: at their end the linear interval covers 85 % and not 95 %.
     slope_ok = (np.abs(zero) <= 0.95) & (factor[:, 6] * slope_se <= _WIDE * np.abs(at_zero))
@@ -296,6 +311,60 @@ def _rise(theta: Array, inverse: Array, half: Array, problems: Problems, low: Ar
         better = new_cost < cost
         moved[better], residual[better], cost[better] = trial[better], new[better], new_cost[better]
     rise: Array = cost.reshape(2, curves, 6) / expected
+    return rise
+
+
+def _rise_at_zero(
+    theta: Array,
+    inverse: Array,
+    gradients: Array,
+    half: Array,
+    zero: Array,
+    problems: Problems,
+    low: Array,
+    high: Array,
+) -> Array:
+    # The same for slope and value at SA = 0 (above and below, curves, 2), each held at the ends of its
+    # interval while all parameters are fitted again: steps of Gauss and Newton, the condition linearised.
+    curves = len(theta)
+    moved_by = np.matvec(inverse[:, None], gradients)  # (curves, 2, 6)
+    variances = np.maximum(np.vecdot(gradients, moved_by), 1e-300)
+    step = moved_by * (half / variances)[..., None]
+    moved = np.stack([theta[:, None] + step, theta[:, None] - step])
+    moved = np.clip(moved, low[:, None], high[:, None]).reshape(-1, 6)
+    repeat = np.tile(np.repeat(np.arange(curves), 2), 2)
+    of_slope = np.tile(np.array([True, False]), 2 * curves)
+    part, low, high, at = problems.take(repeat), low[repeat], high[repeat], zero[repeat]
+    aim = value(theta.T[..., None], problems.u)[repeat]
+
+    def quantity(values: Array) -> Array:
+        return np.asarray(np.where(of_slope, slope(values.T, at), value(values.T, at)))
+
+    start = quantity(theta[repeat])
+    width = np.maximum(np.concatenate([half.ravel(), half.ravel()]), 1e-300)
+    side = np.repeat([1.0, -1.0], 2 * curves)
+    target = start + side * width
+    expected = np.tile((half * half / variances).ravel(), 2)
+    expected = np.where(expected > 0, expected, np.inf)
+    residual = _residual(moved, aim, part)
+    cost, off = np.vecdot(residual, residual), (target - quantity(moved)) / width
+    for _ in range(_REFITS_AT_ZERO):
+        columns = _columns(moved, part)
+        normal = columns @ columns.transpose(0, 2, 1)
+        diagonal = np.einsum("pii->pi", normal)
+        diagonal[...] += 1e-9 * diagonal.max(axis=1)[:, None] + 1e-300
+        a = np.where(of_slope[:, None], slope_jacobian(moved.T, at).T, jacobian(moved.T, at).T)
+        free, along = _solve(normal, np.matvec(columns, residual)), _solve(normal, a)
+        pull = (off * width - np.vecdot(a, free)) / np.maximum(np.vecdot(a, along), 1e-300)
+        trial = np.clip(moved + free + pull[:, None] * along, low, high)
+        new = _residual(trial, aim, part)
+        new_cost, new_off = np.vecdot(new, new), (target - quantity(trial)) / width
+        better = new_cost / expected + _HELD * new_off**2 < cost / expected + _HELD * off**2
+        moved[better], residual[better] = trial[better], new[better]
+        cost[better], off[better] = new_cost[better], new_off[better]
+    # What did not reach the end has risen by the square of its way.
+    reached = np.maximum(1 - side * off, 0.1)
+    rise: Array = (cost / expected / reached**2).reshape(2, curves, 2)
     return rise
 
 
