@@ -90,7 +90,7 @@ def joint_terms_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterat
         ]
         if len(alike) > 1:
             listed = {name: _signals(problem, motion, name, of) for name, of in alike.items()}
-            arguments += [(shape, {name: own[:1] for name, own in listed.items()}) for shape in EACH]
+            arguments += [(shape, {name: (own[0],) for name, own in listed.items()}) for shape in EACH]
             others = [signal for signal in next(iter(listed.values()))[1:] if signal.name not in alike]
             arguments += [
                 (shape, {name: (own[0], other) for name, own in listed.items()})
