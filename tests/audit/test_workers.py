@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.audit.worker_jobs import make
+from toolkit.audit import workers as module
 from toolkit.audit.workers import TIMEOUT_S, Lost, late, run_isolated, time_limit
 from toolkit.errors import ConfigError
 
@@ -128,3 +129,17 @@ def test_workers_whose_run_was_killed_end_without_a_word(tmp_path):
         [sys.executable, str(script)], capture_output=True, text=True, timeout=120, env=env, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (9, "", "")
+
+
+def test_no_more_processes_start_than_there_are_names(monkeypatch):
+    """Each takes the memory of its libraries: `--workers 1000` over three files had started a thousand."""
+    started = []
+    begin = module._Worker
+
+    def counted(**given):
+        started.append(given["process"].pid)
+        return begin(**given)
+
+    monkeypatch.setattr(module, "_Worker", counted)
+    assert dict(run_isolated(make, ["a", "b", "c"], workers=12)) == {"a": "A", "b": "B", "c": "C"}
+    assert len(started) <= 3

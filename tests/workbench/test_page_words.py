@@ -62,6 +62,13 @@ def test_no_template_holds_words_beside_the_catalogue() -> None:
         assert [word for word in words if word != "sha256"] == [], path.name
 
 
+def test_every_list_of_findings_says_how_grave_each_is() -> None:
+    """An error that reads like a note is overlooked: the pages have one way to write a finding."""
+    listed = {path.name for path in TEMPLATES.glob("*.j2") if "{{ finding.message" in path.read_text()}
+    by_level = {path.name for path in TEMPLATES.glob("*.j2") if "level(finding.level)" in path.read_text()}
+    assert listed <= by_level
+
+
 def test_numbers_take_the_decimal_sign_of_the_language_and_keep_their_value() -> None:
     drawn = {
         name: templates(name).from_string("{{ number(-1.25, '.2f', 'N') }}").render()

@@ -116,6 +116,8 @@ def test_a_finding_of_the_protocol_stands_on_the_page(tested: Served, capsys: Ca
     rules = {finding["rule"] for finding in answer["findings"]}
     assert "missing" in rules
     assert {*re.findall(r'data-rule="([^"]+)"', part.body)} == rules
+    shown = re.findall(r'data-rule="([^"]+)"><b class="\w+" data-level="(\w+)">', part.body)
+    assert shown == [(finding["rule"], finding["level"]) for finding in answer["findings"]]
 
 
 def test_what_is_shown_is_downloaded_and_the_reduced_test_whole(

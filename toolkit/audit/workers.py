@@ -82,7 +82,7 @@ def run_isolated(
     ----------
     make : called once in each worker, returns what is called with each name; both must pickle
     names : what there is to do
-    workers : processes
+    workers : processes, no more than there are names
     timeout_s : of each name; its worker is killed beyond
 
     Raises
@@ -142,7 +142,8 @@ def run_isolated(
 
     try:
         while todo or any(worker.waiting for worker in pool):
-            while len(pool) < min(limit, len(todo) + len(pool)) and todo:
+            # One for each name that is read or waits for it: an idle process costs what a busy one does.
+            while len(pool) < min(limit, len(todo) + sum(bool(worker.waiting) for worker in pool)):
                 pool.append(start())
             for worker in pool:
                 feed(worker)
