@@ -206,14 +206,14 @@ def best_step(
     if not standing:
         return None
     # What fits beside parameters that nobody believes yields to what takes its place beside believable ones.
-    believed = [(trial, scores) for trial, scores in standing if _is_believable(problem, trial.fit)]
-    if believed:
-        joint = [trial for trial in joint if _is_believable(problem, trial.fit)]
-        standing = believed
+    standing = [entry for entry in standing if _is_believable(problem, entry[0].fit)] or standing
     # The first fits best. Where more than noise is left, that is also what the fit made of the rest, and one
     # that foretells unseen rows better goes before it; the better fit then stays in its class.
     best = max(standing, key=lambda entry: entry[1].total)
     trial, scores = best if best[1].total > standing[0][1].total + STEP.least_gain else standing[0]
+    if _is_believable(problem, trial.fit):  # nor is it one class with what nobody believes
+        least = trial.compared - VERDICT.close
+        joint = [each for each in joint if each.compared <= least or _is_believable(problem, each.fit)]
     step = Step(
         active=trial.fit.active[-1],
         p_value=p_of[id(trial.scored)],
