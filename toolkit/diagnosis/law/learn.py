@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from toolkit.diagnosis.fit.among_runs import tells_runs_apart_alone
 from toolkit.diagnosis.fit.fit import sizes_off
 from toolkit.diagnosis.fit.folds import hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
@@ -24,7 +25,6 @@ from toolkit.diagnosis.law.trial import (
     Trial,
     curve_trial,
     scales_of,
-    tells_runs_apart_alone,
     trials_of,
     unlocked_tone,
 )
@@ -317,7 +317,11 @@ def _judged(
             return None
         outputs = trial.outputs if search.folds.by_run else ()
         if outputs and all(
-            tells_runs_apart_alone(trial, looked, _of_runs(problem, name, held_out, scores, trial))
+            tells_runs_apart_alone(
+                _of_runs(problem, name, held_out, scores, trial),
+                cost=trial.cost,
+                tests=max(looked, 1) * trial.looked,
+            )
             for name in outputs
         ):
             return None

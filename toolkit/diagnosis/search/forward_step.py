@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from toolkit.diagnosis.fit.among_runs import tells_runs_apart_alone
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, beyond_form, hold_out, matters
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.fit.unknown_past import past_gain
-from toolkit.diagnosis.policy import PRIORS, STEP, VERDICT
+from toolkit.diagnosis.policy import PRIORS, SCREENING, STEP, VERDICT
 from toolkit.diagnosis.search.bends import only_bends
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
@@ -188,6 +189,8 @@ def best_step(
             continue
         if only_bends(problem, made):
             continue
+        if is_of_runs_alone(problem, base, made):
+            continue
         if may_wander(problem, made.active[-1]) and not outdoes_wandering(problem, base, made):
             continue
         scores = trial.held_out(problem, folds)
@@ -227,6 +230,33 @@ def best_step(
 def _is_believable(problem: Problem, made: Fit) -> bool:
     """Tell whether no parameter of the simulation is far off its prior."""
     return bool(np.all(np.abs(problem.off_priors(made.p)) <= PRIORS.far))
+
+
+def is_of_runs_alone(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Tell whether effects of some runs take only what any runs' zeros and gains differ by."""
+    present = {applied.key for applied in before.active}
+    added = [applied for applied in after.active if applied.key not in present]
+    confined = sum(applied.runs is not None for applied in added)
+    if not confined:
+        return False
+    counting = {
+        name: [rows.start + np.flatnonzero(kept[rows]) for rows in problem.slices if kept[rows].any()]
+        for name, kept in problem.kept.items()
+        if kept.any()
+    }
+    return all(
+        tells_runs_apart_alone(
+            [
+                (before.simulated[name][at], before.residual[name][at], after.residual[name][at])
+                for at in places
+            ],
+            cost=max(sum(len(applied.searched) for applied in added), 1),
+            tests=len(problem.runs) ** confined,
+            alpha=SCREENING.alpha,
+            of_some=True,
+        )
+        for name, places in counting.items()
+    )
 
 
 def drifts_faster(problem: Problem, before: Fit, after: Fit) -> bool:

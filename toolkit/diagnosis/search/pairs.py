@@ -22,7 +22,7 @@ from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.fit.unknown_past import past_gain
 from toolkit.diagnosis.policy import PAIRS, SCREENING, STEP
 from toolkit.diagnosis.search.bends import only_bends
-from toolkit.diagnosis.search.forward_step import Rival, Step, drifts_faster, joint_fit
+from toolkit.diagnosis.search.forward_step import Rival, Step, drifts_faster, is_of_runs_alone, joint_fit
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
@@ -111,7 +111,7 @@ def best_pair(
         check()
         members = _reached(screen, pair)
         joint = None if members is None else joint_fit(problem, base, members)
-        if joint is None or only_bends(problem, joint):
+        if joint is None or only_bends(problem, joint) or is_of_runs_alone(problem, base, joint):
             continue
         if not drifts_faster(problem, base, joint):
             fitted.append((pair, joint))

@@ -18,6 +18,7 @@ from toolkit.diagnosis.search.forward_step import (
     best_step,
     cost,
     drifts_faster,
+    is_of_runs_alone,
     joint_fit,
     joint_fits,
     ranked,
@@ -98,7 +99,7 @@ def _joined(
     joint = joint_fit(problem, base, [scored.active for scored in members], begin=members[0].p)
     if joint is None or only_bends(problem, joint):
         return None
-    if drifts_faster(problem, base, joint):
+    if drifts_faster(problem, base, joint) or is_of_runs_alone(problem, base, joint):
         return None
     try:
         held_out = hold_out(problem, folds, joint.active, joint)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from toolkit.diagnosis.law.trial import tells_runs_apart_alone
-
-TWO_NUMBERS = SimpleNamespace(cost=2, looked=1)
+from toolkit.diagnosis.fit.among_runs import tells_runs_apart_alone
 
 
 def runs(count, law, rng, *, zero=0.5, gain=0.0, left=0.4):
@@ -31,20 +27,20 @@ def runs(count, law, rng, *, zero=0.5, gain=0.0, left=0.4):
 @pytest.mark.parametrize("differing", [{"zero": 0.5}, {"zero": 0.0, "gain": 0.5}])
 def test_zeros_or_gains_of_four_runs_make_no_law(differing):
     listed = runs(4, lambda y: 0 * y, np.random.default_rng(1), **differing)
-    assert tells_runs_apart_alone(TWO_NUMBERS, 300, listed)
+    assert tells_runs_apart_alone(listed, cost=2, tests=300)
 
 
 def test_what_bends_within_the_runs_is_a_law_beside_their_zeros():
     listed = runs(4, lambda y: y**3 - 0.75 * y, np.random.default_rng(1), left=1.0)
-    assert not tells_runs_apart_alone(TWO_NUMBERS, 300, listed)
+    assert not tells_runs_apart_alone(listed, cost=2, tests=300)
 
 
 @pytest.mark.parametrize("common", [lambda y: 0.5 + 0 * y, lambda y: 0.5 * y])
 def test_a_zero_and_a_gain_that_all_runs_share_are_no_difference_of_runs(common):
     listed = runs(3, common, np.random.default_rng(1), left=1.0, zero=0.1)
-    assert not tells_runs_apart_alone(TWO_NUMBERS, 300, listed)
+    assert not tells_runs_apart_alone(listed, cost=2, tests=300)
 
 
 def test_thirty_runs_are_evidence_of_their_zeros():
     listed = runs(30, lambda y: 0 * y, np.random.default_rng(1), left=0.1)
-    assert not tells_runs_apart_alone(TWO_NUMBERS, 300, listed)
+    assert not tells_runs_apart_alone(listed, cost=2, tests=300)
