@@ -50,3 +50,27 @@ def test_the_rate_of_a_recorded_angle_is_no_signal_of_a_law(tmp_path, angle, fac
     # A lag's difference is a rate: what the angle was before is no signal either.
     assert signals["q"].remembered is ("dq/dt" in read)
     assert signals["U"].remembered
+
+
+@pytest.mark.parametrize(
+    ("copied", "read"), [(True, {"U", "w", "time"}), (False, {"U", "again", "w", "time"})]
+)
+def test_a_copy_of_an_output_is_no_signal_of_a_law(tmp_path, copied, read):
+    """Another reading of the same, noise and all, may say something; a copy of the column does not."""
+    (tmp_path / "sim.py").write_text(SIMULATOR)
+    (tmp_path / "case.toml").write_text(
+        case_text(
+            "python", function="simulate", parameters={"k": (2.0, "rad/(s*V)", 0.1)}, inputs={"U": "V"},
+            outputs={"w": "rad/s"}, others={"again": {"unit": "rad/s", "role": "covariate"}}, runs=1,
+        )
+    )  # fmt: skip
+    rng = np.random.default_rng(1)
+    t = np.arange(300) * 0.02
+    u = 5 + 3 * np.sin(2 * t)
+    w = 2 * u + rng.normal(0, 0.1, len(t))
+    again = w if copied else w + rng.normal(0, 0.1, len(t))
+    pd.DataFrame({"t": t, "U": u, "w": w, "again": again}).to_csv(tmp_path / "r0.csv", index=False)
+    case = read_case(tmp_path / "case.toml")
+    problem = problem_of(case, model_of(case, None))
+    names = {signal.name for signal in signals_of(problem, fit(problem), "w")}
+    assert names & {"U", "again", "w", "time"} == read
