@@ -11,9 +11,13 @@ nothing. Forces are in N, moments in N·m, angles in rad, in SAE J670 axes, unle
 >>> record
 <Record m15-virtual-r1 | approved, in force from 2026-03-03 | verified | FY, MZ, MX from ...>
 
-A record turns indications into loads, each with its expanded uncertainty; units stand in the headers:
+A record turns indications into loads, each with its expanded uncertainty; units stand in the headers. What
+the cells showed without a load is their tare:
 
->>> loads = record.apply({"D51 [mV/V]": [0.1, 0.2], "D52 [mV/V]": [0.1, 0.2], "E5 [mV/V]": [0.1, 0.1]})
+>>> loads = record.apply(
+...     {"D51 [mV/V]": [0.1, 0.2], "D52 [mV/V]": [0.1, 0.2], "E5 [mV/V]": [0.1, 0.1]},
+...     tare={"D51": 0.01, "D52": 0.0, "E5": 0.0},
+... )
 >>> loads
 <Loads 2 rows | FY [N], MZ [N*m], MX [N*m] | m15-virtual-r1>
 >>> list(loads.to_dataframe().columns)

@@ -456,9 +456,7 @@ class _Verdict:
 
     close: float = _set(3.0, "of the log-likelihood", "within which the data prefer neither of two effects")
     mostly: float = _set(0.5, "of the log-likelihood", "named effects explain it, beside what stays unknown")
-    nearly: float = _set(
-        0.9, "of the held-out mean square above the noise", "effects that take it stay, whatever the rest is"
-    )
+    nearly: float = _set(0.9, "of the held-out mean square above the noise", "little is left beside it")
     taken: float = _set(
         2 / 3, "of the held-out mean square above the noise", "named effects take, in one output"
     )

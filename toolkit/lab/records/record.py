@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
 from toolkit.errors import ConfigError
+from toolkit.lab.answers import counted
 from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
 from toolkit.units import printed
@@ -296,7 +297,7 @@ class Loads(Face):
             "loads": ", ".join(f"{name} [{self.units[name]}]" for name in self.value),
             "record": self.use.id,
             "mark": self.use.mark,
-            "findings": f"{len(self.findings)} findings" if self.findings else None,
+            "findings": counted(len(self.findings), "finding") if self.findings else None,
         }
 
     def _plots(self) -> Mapping[str, Plot]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from toolkit.lab.answers import counted
 from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts, as_path
 
@@ -84,7 +85,7 @@ class Diagnosis(Face):
             "case": self.answer.title,
             "verdict": self.verdict,
             "effects": ", ".join(effects) or None,
-            "findings": f"{len(self.findings)} findings" if self.findings else None,
+            "findings": counted(len(self.findings), "finding") if self.findings else None,
         }
 
     def _plots(self) -> Mapping[str, Plot]:

@@ -233,7 +233,7 @@ class ProcessedTest(Face):
             "calibration": use.id,
             "mark": use.mark,
             "impossible": "IMPOSSIBLE VALUES" if reduced.impossible else None,
-            "findings": f"{len(self.findings)} findings" if self.findings else None,
+            "findings": counted(len(self.findings), "finding") if self.findings else None,
             "simulated": "SIMULATED" if info.simulated else None,
         }
 

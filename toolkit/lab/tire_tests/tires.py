@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from toolkit.lab.answers import counted
 from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
 from toolkit.lab.quantities import tire_table
@@ -105,7 +106,7 @@ class TireFit(Face):
             "models": ", ".join(self.result.comparison.models),
             "errors": ", ".join(f"{row.channel} {row.error_percent:.2f} %" for row in rows),
             "mark": self.result.use.mark if self.result.use else None,
-            "findings": f"{len(self.findings)} findings" if self.findings else None,
+            "findings": counted(len(self.findings), "finding") if self.findings else None,
         }
 
     def _plots(self) -> Mapping[str, Plot]:
