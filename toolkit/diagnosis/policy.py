@@ -318,7 +318,7 @@ class _Unseen:
     """What is named by its free simulation of unseen runs alone, where the rest is beyond all noise."""
 
     runs: int = _set(3, "runs", "held out whole: two agree by chance")
-    runs_of_laws: int = _set(2, "runs", "held out whole for a law, which gives no name to what two may share")
+    runs_of_laws: int = _set(2, "runs", "held out whole for a law: it is a description, and names nothing")
     fitted: int = _set(4, "candidates", "fitted jointly, of those that screening ranks first")
     judged: int = _set(3, "candidates", "held out, of those that the joint fits leave the least of")
     usual: float = _set(

@@ -49,7 +49,8 @@ def tells_runs_apart_alone(
 def _parts(runs: Sequence[tuple[Array, Array]], *, of_some: bool) -> tuple[float, float]:
     """Return the mean squares of errors less what zeros and gains of runs take, and of what these take.
 
-    A zero and a gain that all runs have alike are none of a run's own.
+    A zero and a gain that all runs have alike are none of a run's own: something that acts in all of them may
+    take these, something that acts in some (``of_some``) may not.
     """
     designs = [np.column_stack([np.ones(len(simulated)), simulated]) for simulated, _ in runs]
     stacked = np.concatenate([error for _, error in runs])
@@ -59,9 +60,5 @@ def _parts(runs: Sequence[tuple[Array, Array]], *, of_some: bool) -> tuple[float
         for design, (_, error) in zip(designs, runs, strict=True)
     ]
     of_a_run = np.concatenate([design @ (size - common) for design, size in zip(designs, own, strict=True)])
-    apart = (
-        of_a_run
-        if not of_some
-        else np.concatenate([design @ size for design, size in zip(designs, own, strict=True)])
-    )
-    return float(np.mean((stacked - apart) ** 2)), float(np.mean(of_a_run**2))
+    shared = np.vstack(designs) @ common if of_some else 0.0
+    return float(np.mean((stacked - of_a_run - shared) ** 2)), float(np.mean(of_a_run**2))

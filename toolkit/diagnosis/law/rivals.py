@@ -38,9 +38,9 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     Effects imitate much that they are not, and a law beside one then mends what is left. Asked where laws
     stand beside effects, where these leave what is known to be no noise, and in an equation where they leave
     more than the sensor's noise: what is missing there rings, coloured noise takes it up, and no structure
-    shows. In an equation a name that leaves more
-    than the sensor's noise where laws do not is lost: it imitates them. Else what takes nearly all that the
-    laws take keeps its name, and any other loses it where all that is named has another size beside them.
+    shows. In an equation a name that leaves more than the sensor's noise where laws that foretell no worse do
+    not is lost: it imitates them. Else what takes nearly all that the laws take, or most of it with fewer
+    parameters, keeps its name, and any other loses it where all that is named has another size beside them.
     """
     predicting = any(law.predicts for law in laws.listed)
     is_asked = predicting or _leaves_process_noise(search)
@@ -265,9 +265,8 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
     Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
     dropped where the held-out score of the laws beside refitted parameters is as good without it, where laws
     as simple are better in its place and it is the small part of both, or where it has the other sign beside
-    them. One that takes nearly all that
-    the laws take in its place keeps its name: they mend its form (a leak of the load into a force, before or
-    after the filter).
+    them. One that takes nearly all that the laws take in its place, or most of it with fewer parameters, keeps
+    its name: they mend its form (a leak of the load into a force, before or after the filter).
     """
     if not any(law.predicts for law in laws.listed):
         return search, laws

@@ -140,7 +140,10 @@ ALIKE: tuple[Shape, ...] = (
 EACH: tuple[Shape, ...] = tuple(
     shape for shape in ONE if shape.text in {"a*{x}", "a*{x}*abs({x})", "a*{x}**3"}
 )
-"""Shapes of its own state that all equations of one kind may lack."""
+"""Shapes of its own state that all equations of one kind may lack: losses, smooth and without a place.
+
+What changes its sign at rest is friction, an effect of its own, and many times dearer to integrate.
+"""
 MODE = Shape(
     form="mode", text="a*mode({x}, frequency, damping)", starts=_modes,
     units={"a": "{y}/{x}", "frequency": "Hz", "damping": "1"},

@@ -150,7 +150,12 @@ def asked_of_unseen_runs(
 def takes_most(
     problem: Problem, before: HeldOut | Fit, after: HeldOut | Fit, usual: float = UNSEEN.usual
 ) -> bool:
-    """Tell whether most of the error is gone: nearly all of it in the median run, and half in every one."""
+    """Tell whether most of the error is gone, and half of it in every run.
+
+    Parameters
+    ----------
+    usual : share of the median run's mean square; nearly all where it is to be a name
+    """
     shares = 1 - _runs(problem, after.simulated) / np.maximum(_runs(problem, before.simulated), 1e-300)
     return bool(np.median(shares) > usual and shares.min() > UNSEEN.every)
 
