@@ -265,8 +265,8 @@ def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[
     Part of a law's answer looks like this effect or that one, and the search has only effects to name. One is
     dropped where the held-out score of the laws beside refitted parameters is as good without it, where laws
     as simple are better in its place and it is the small part of both, or where it has the other sign beside
-    them. One that takes nearly all that the laws take in its place, or most of it with fewer parameters, keeps
-    its name: they mend its form (a leak of the load into a force, before or after the filter).
+    them. One that takes nearly all that the laws take in its place, or most of it with fewer parameters,
+    keeps its name: they mend its form (a leak of the load into a force, before or after the filter).
     """
     if not any(law.predicts for law in laws.listed):
         return search, laws
