@@ -79,7 +79,7 @@ def _always(problem: Problem, active: AppliedEffect) -> list[str]:
 
 def implausible(search: Search) -> tuple[str, ...]:
     """Return the parameters that are far off their priors beside every effect that was found."""
-    values = zip(search.problem.free, search.augmented.p, strict=True)
+    values = zip(search.problem.declared, search.augmented.p, strict=False)
     return tuple(
         parameter.name
         for parameter, p in values

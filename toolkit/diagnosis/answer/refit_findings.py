@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from toolkit.diagnosis.policy import LOCATION, PRIORS, VERDICT
 from toolkit.diagnosis.search.run_parameters import errors_apart
 from toolkit.diagnosis.search.unseen_runs import unseen_errors
+from toolkit.diagnosis.simulators.run_starts import RunStart
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def refit_findings(case: Case, search: Search) -> tuple[Finding, ...]:
     """Return what is told of parameters at their bounds, runs that differ, and a refit that does harm."""
     return (
         *_at_bounds(case, search), *_alike(case, search), *_scatter(case, search),
-        *_disagreed(case, search), *_worse(case, search), *_drifting(case, search),
+        *_disagreed(case, search), *_worse(case, search), *_drifting(case, search), *_started(case, search),
     )  # fmt: skip
 
 
@@ -93,6 +94,23 @@ def _drifting(case: Case, search: Search) -> tuple[Finding, ...]:
     )
 
 
+def _started(case: Case, search: Search) -> tuple[Finding, ...]:
+    by_run: dict[str, list[str]] = {}
+    for parameter, value in zip(search.problem.free, search.augmented.p, strict=True):
+        if isinstance(parameter, RunStart) and abs(value) > PRIORS.far * parameter.sd:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            by_run.setdefault(parameter.run_name, []).append(f"{parameter.state} {value:+.3g}{unit}")
+    return tuple(
+        Finding(
+            rule="run-starts",
+            where=f"{case.path.name}: {run}",
+            level="warning",
+            message=f"by its own rows the run starts off where `initial` puts it: {', '.join(off)}",
+        )
+        for run, off in by_run.items()
+    )
+
+
 def _scatter(case: Case, search: Search) -> tuple[Finding, ...]:
     units = {output.name: output.unit for output in search.problem.model.outputs}
     return tuple(
@@ -128,7 +146,7 @@ def _disagreed(case: Case, search: Search) -> tuple[Finding, ...]:
 def _at_bounds(case: Case, search: Search) -> tuple[Finding, ...]:
     findings = []
     for parameter, refitted, augmented in zip(
-        search.problem.free, search.refitted.p, search.augmented.p, strict=True
+        search.problem.declared, search.refitted.p, search.augmented.p, strict=False
     ):
         values = {"refitted": refitted} | ({"with the effects": augmented} if search.steps else {})
         shifts = {fit: (value - parameter.value) / (parameter.sd or 1.0) for fit, value in values.items()}

@@ -25,6 +25,7 @@ import numpy as np
 
 from toolkit.diagnosis.fit.noise import Autoregression, Differences, Layout, whiten
 from toolkit.diagnosis.policy import PRIORS
+from toolkit.diagnosis.simulators.run_starts import RunStart
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
 
@@ -154,6 +155,11 @@ class Weighing:
             )
         p, _ = self._space.split(x)
         return np.concatenate([self._whitened(residual), self._space.problem.off_priors(p)])
+
+    def square(self, x: Array) -> float:
+        """Return half the square of that."""
+        cost = self.cost(x)
+        return 0.5 * float(cost @ cost)
 
     def slope(self, slopes: Stacked) -> Array:
         """Return d(cost)/dx from d(simulated)/dx."""
@@ -382,23 +388,39 @@ class Space:
         # Together they have the same steps: what these leave is then no part of a difference.
         self.problem.prepare([self.split(point) for point in (x, *points)])
         simulated = self._anew(x, x.tobytes())
-        slopes = {name: np.empty((len(column), len(x))) for name, column in simulated.items()}
-        for i, moved in enumerate(points):
+        slopes = {name: np.zeros((len(column), len(x))) for name, column in simulated.items()}
+        for listed, moved in zip(self._groups(), points, strict=True):
             try:
                 trial = self.problem.simulate(*self.split(moved))
             except FitError:
                 trial = simulated
-            for name, column in trial.items():
-                slopes[name][:, i] = (column - simulated[name]) / (moved[i] - x[i])
+            for i, rows in listed:
+                for name, column in trial.items():
+                    slopes[name][rows, i] = (column[rows] - simulated[name][rows]) / (moved[i] - x[i])
         return simulated, slopes
+
+    def _groups(self) -> list[list[tuple[int, slice]]]:
+        """Return the parameters that one simulation serves, each with the rows that answer to it alone.
+
+        Where a run starts moves no other run: one simulation moves a state's starts in all of them (Curtis,
+        Powell and Reid, J. Inst. Math. Appl. 13 (1974) 117).
+        """
+        groups: dict[object, list[tuple[int, slice]]] = {}
+        for i in range(len(self.sizes)):
+            parameter = self.problem.free[i] if i < len(self.problem.free) else None
+            if isinstance(parameter, RunStart):
+                groups.setdefault(parameter.state, []).append((i, self.problem.slices[parameter.run]))
+            else:
+                groups[i] = [(i, slice(0, self.problem.rows))]
+        return list(groups.values())
 
     def _moved(self, x: Array, reach: Array | None) -> list[Array]:
         points, most = [], np.full(len(x), math.inf) if reach is None else reach
-        for i in range(len(x)):
-            step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (self.high[i] - self.low[i]), most[i])
-            step = -step if x[i] + step > self.high[i] else step
+        for listed in self._groups():
             moved = x.copy()
-            moved[i] += step
+            for i, _ in listed:
+                step = min(_STEP * max(abs(x[i]), 1.0), 0.1 * (self.high[i] - self.low[i]), most[i])
+                moved[i] += -step if x[i] + step > self.high[i] else step
             points.append(moved)
         return points
 

@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 
     Stacked = dict[str, Array]
 
-# The covariance of a joint fit: of generalised least squares, or the sandwich of ordinary ones.
-
-
 _OPEN = 1e12  # variance, in searched units, of what the data leave open altogether
 
 
@@ -164,23 +161,23 @@ def fit(
         derivatives = Derivatives(Space.of(problem, tuple(active)))
     space = derivatives.space
     layouts = {name: problem.layout(name, rows) for name in problem.names}
-    x = space.begin([parameter.value for parameter in problem.free] if start is None else start)
+    x = white = space.begin([parameter.value for parameter in problem.free] if start is None else start)
     if plain and noise and any(each.is_coloured for each in noise.values()):  # what rows are worth is known
         begun = space.simulated(x)
         solved = _Solved(x, begun, space.residual(begun), noise, -math.inf)
     else:
-        solved = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives, least)
+        solved, white = _coloured(space, layouts, x, noise, 2 if plain else rounds, derivatives, least)
     alternative = None
     if solved.score < least:  # ordinary least squares are no likelier: the plain solution cannot reach it
         plain, intervals = False, False
     if plain is None:
         alternative = _plain_nearby(space, layouts, solved, derivatives)
         if alternative is not None and _absorbs(space, solved, alternative, layouts, margin=_MARGIN):
-            alternative = _plain(space, layouts, solved, derivatives)
+            alternative = _plain(space, layouts, solved, derivatives, white)
         plain = alternative is not None and _absorbs(space, solved, alternative, layouts)
         solution = alternative if plain and alternative is not None else solved
     else:
-        solution = _plain(space, layouts, solved, derivatives) or solved if plain else solved
+        solution = _plain(space, layouts, solved, derivatives, white) or solved if plain else solved
     p, values = space.split(solution.x)
     fitted = Fit(
         p=tuple(p),
@@ -212,41 +209,46 @@ def _coloured(
     rounds: int,
     derivatives: Derivatives,
     least: float,
-) -> _Solved:
-    """Return generalised least squares, the noise estimated anew in every round.
+) -> tuple[_Solved, Array]:
+    """Return generalised least squares, the noise estimated anew in every round, and where white noise led.
 
     Each round gains less than the one before: where as much again does not reach ``least``, it is the last.
     """
     best: _Solved | None = None
-    noise_now = noise
+    noise_now, white = noise, x
     for turn in range(max(rounds, 1)):
         first = noise_now is None
         if noise_now is None:
             noise_now = _white(space.problem, space.residual(space.simulated(x)), layouts)
         # White noise of what the start leaves is nobody's: it only leads to where the noise can be seen.
         solved = _solve(space, layouts, x, noise_now, derivatives, share=_ROUGH if first else 0.0)
+        white = solved.x if first else white
         if best is not None and solved.score < best.score + _BETTER:
-            return solved if solved.score > best.score else best
+            return (solved if solved.score > best.score else best), white
         if best is not None and 2 * solved.score - best.score < least:
-            return solved
+            return solved, white
         best, x, noise_now = solved, solved.x, solved.noise
         if not len(x) and turn:
             break
-    return cast("_Solved", best)
+    return cast("_Solved", best), white
 
 
 def _plain(
-    space: Space, layouts: dict[str, Layout], from_: _Solved, derivatives: Derivatives
+    space: Space, layouts: dict[str, Layout], from_: _Solved, derivatives: Derivatives, white: Array
 ) -> _Solved | None:
     """Return ordinary least squares, each output weighed by what its rows are worth; None for white noise.
 
+    A coloured noise that has taken physics for its own led away from where white noise had led.
     Of an output that only drifts they are those of its differences: its own squares are the sum of all that
     pushed it before, and the smallest sum says nothing of what each push was.
     """
     if not _is_coloured(from_):
         return None
     drifting = _drifting(space, layouts)
-    return _solve(space, layouts, from_.x, _worth(space, from_, drifting), derivatives, drifting)
+    worth = _worth(space, from_, drifting)
+    squares = [Weighing(space, layouts, worth, drifting).square(x) for x in (from_.x, white)]
+    begin = white if squares[1] < squares[0] else from_.x
+    return _solve(space, layouts, begin, worth, derivatives, drifting)
 
 
 def _plain_nearby(
@@ -494,5 +496,5 @@ def _covariance(
     if (
         added.any() and alternative.score == -math.inf
     ):  # by the straight way alone: the bent one tells how much
-        added = disagreeing(_plain(space, layouts, solved, derivatives) or alternative)
+        added = disagreeing(_plain(space, layouts, solved, derivatives, solved.x) or alternative)
     return matrix + np.diag(added)

@@ -87,7 +87,7 @@ def folds_of(problem: Problem, fit: Fit) -> Folds:
 
 def _own_parameters(problem: Problem, fit: Fit) -> bool:
     columns, _ = jacobian(problem, fit)
-    for i in range(len(problem.free)):
+    for i in range(len(problem.declared)):
         moved = [
             any(float(np.abs(columns[name][rows, i]).max()) > 0 for name in problem.names)
             for rows in problem.slices

@@ -12,6 +12,7 @@ import numpy as np
 from toolkit.diagnosis.fit.noise import Layout, layout
 from toolkit.diagnosis.fit.row_order import drivers_of
 from toolkit.diagnosis.policy import ROWS
+from toolkit.diagnosis.simulators.run_starts import RunStart
 from toolkit.diagnosis.simulators.simulator import Model, TermPattern
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import FitError
@@ -45,7 +46,7 @@ class Problem:
     case: Case
     model: Model
     runs: tuple[Run, ...]
-    free: tuple[CaseParameter, ...]
+    free: tuple[CaseParameter | RunStart, ...]
     known: dict[str, float]
     observed: Stacked
     kept: dict[str, NDArray[np.bool_]]
@@ -54,6 +55,20 @@ class Problem:
     rates: Mapping[str, int] = field(default_factory=dict)
     shown_sd: Mapping[str, float] = field(default_factory=dict)
     memory: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def declared(self) -> tuple[CaseParameter, ...]:
+        """Free parameters that the case declares; starts of runs stand behind them."""
+        return tuple(parameter for parameter in self.free if not isinstance(parameter, RunStart))
+
+    @property
+    def starts(self) -> tuple[RunStart, ...]:
+        """Free starts of runs, behind the parameters that the case declares."""
+        return tuple(parameter for parameter in self.free if isinstance(parameter, RunStart))
+
+    def begun(self, p: Sequence[float]) -> tuple[float, ...]:
+        """Return free parameters of a fit, with the starts of the runs where they are to begin."""
+        return (*p[: len(self.declared)], *(start.value for start in self.starts))
 
     @property
     def values(self) -> float:

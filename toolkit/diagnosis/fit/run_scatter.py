@@ -164,10 +164,10 @@ def run_parameter(problem: Problem, made: Fit, *, least: float) -> RunParameter 
     FitError
         the simulation gives nothing at a run's own value
     """
-    if len(problem.runs) < 2 or not problem.free:
+    if len(problem.runs) < 2 or not problem.declared:
         return None
     columns, _ = jacobian(problem, made)
-    taken = [_taken_by_own(problem, made, columns, at) for at in range(len(problem.free))]
+    taken = [_taken_by_own(problem, made, columns, at) for at in range(len(problem.declared))]
     best = int(np.argmax(taken))
     if taken[best] < least:
         return None

@@ -357,7 +357,7 @@ def _law(
     problem, fitted = search.problem, refit.active[-len(trial.together) :]
     moved = [
         parameter.name
-        for parameter, before, after in zip(problem.free, base.p, refit.p, strict=True)
+        for parameter, before, after in zip(problem.declared, base.p, refit.p, strict=False)
         if parameter.sd and abs(after - before) > LAWS.moved * parameter.sd
     ]
     event = trial.form == "event"

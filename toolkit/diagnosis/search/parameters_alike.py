@@ -39,7 +39,7 @@ def with_parameters_alike(search: Search) -> Search:
 
 def _alike(problem: Problem, base: Fit, applied: AppliedEffect) -> ParameterInPlace | None:
     active = without(base.active, applied)
-    if not applied.searched or not problem.free:
+    if not applied.searched or not problem.declared:
         return None
     at = _nearest(problem, base, active)
     if at is None:
@@ -67,7 +67,7 @@ def _nearest(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...]) -> 
         np.concatenate([whiten(each[name][at.index], at, base.noise[name]) for name, at in layouts.items()])
         for each in (
             {name: (base.simulated[name] - bare[name])[:, None] for name in problem.names},
-            {name: columns[name][:, : len(problem.free)] for name in problem.names},
+            {name: columns[name][:, : len(problem.declared)] for name in problem.names},
         )
     )
     sizes = np.sum(moved**2) * np.sum(answers**2, axis=0)

@@ -17,17 +17,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.sensor_noise import noise_parts
+from toolkit.diagnosis.fit.along_recording import followed_along
 from toolkit.diagnosis.policy import FOLLOWING, SCREENING
 from toolkit.diagnosis.search.candidates import CandidateEffect, Start, candidates
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.screen import Scored
 from toolkit.diagnosis.search.unexplained import StructureFound
-from toolkit.diagnosis.simulators.following import PARAMETER_STEP
-from toolkit.diagnosis.simulators.simulator import Following, TermPattern
+from toolkit.diagnosis.simulators.simulator import TermPattern
 from toolkit.diagnosis.simulators.states import usual_step, way_of
 from toolkit.effects.law import ITSELF, POSITION, TIME
-from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,27 +129,8 @@ def likelihood_along(problem: Problem, base: Fit) -> float | None:
 
 def _errors_along(problem: Problem, base: Fit, steadier: float) -> _PredictionErrors | None:
     """Return the prediction errors of a fit's equation; None where it cannot be followed."""
-    moving = problem.model.capability.motion
-    led_along = None if moving is None else moving.followed
-    if led_along is None:
-        return None
-    p = dict(problem.known) | {
-        parameter.name: value for parameter, value in zip(problem.free, base.p, strict=True)
-    }
-    asked = Following(
-        steps={parameter.name: PARAMETER_STEP * (parameter.sd or 1.0) for parameter in problem.free},
-        sensor={name: noise_parts(problem, base, name).sensor_sd or 1.0 for name in problem.names},
-        unread={
-            name: tuple(np.flatnonzero(~kept & np.isfinite(problem.observed[name])).tolist())
-            for name, kept in problem.kept.items()
-        },
-        steadier=steadier,
-    )
-    try:
-        followed, answers = led_along(problem.runs, p, base.active, asked)
-    except FitError:
-        return None
-    return _PredictionErrors(problem, base, followed, answers / PARAMETER_STEP)
+    made = followed_along(problem, base, steadier)
+    return None if made is None else _PredictionErrors(problem, base, *made)
 
 
 def _shown(errors: _PredictionErrors) -> Proposals:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.diagnosis.fit.along_recording import with_run_starts
 from toolkit.diagnosis.fit.drift import judged_by_rates
 from toolkit.diagnosis.fit.fit import Fit, fit, noise_of, replace_effects
 from toolkit.diagnosis.fit.folds import Folds, HeldOut, folds_of, hold_out, matters, unseen_error
@@ -164,6 +165,10 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     problem = judged_by_rates(problem, refitted)
     if problem.rates:
         refitted = fit(problem, start=refitted.p)
+    budget.check("where the runs start")
+    problem = with_run_starts(problem, refitted)
+    if problem.starts:
+        nominal, refitted = _as_declared(problem), fit(problem, start=problem.begun(refitted.p))
     folds = folds_of(problem, refitted)
     found = _searched(problem, folds, nominal, refitted, seed, budget)
     weighed = weighed_as_mismatch(problem, refitted)
@@ -203,10 +208,11 @@ def _searched(
     try:
         for turn in range(STEP.most_effects + 1):
             base, steps = with_a_size(problem, base, steps)
-            if problem.memory and steps:
-                problem = weighed_as_mismatch(problem, base)
-                refitted = fit(problem, start=refitted.p)
-                base = fit(problem, base.active, start=base.p)
+            if steps and (problem.memory or problem.starts):
+                problem = weighed_as_mismatch(problem, base) if problem.memory else problem
+                problem = with_run_starts(problem, base) if problem.starts else problem
+                refitted = fit(problem, start=problem.begun(refitted.p))
+                base = fit(problem, base.active, start=problem.begun(base.p))
                 held_refitted = hold_out(problem, folds, (), refitted)
                 held_base = hold_out(problem, folds, base.active, base)
             share = STEP.later if turn else STEP.first

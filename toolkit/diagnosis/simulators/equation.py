@@ -12,6 +12,7 @@ import numpy as np
 from toolkit.diagnosis.simulators.columnwise import columnwise
 from toolkit.diagnosis.simulators.forces import Forces, ForcesTogether
 from toolkit.diagnosis.simulators.integrate import OFF, wrong_rates
+from toolkit.diagnosis.simulators.run_starts import start_name, without_starts
 from toolkit.diagnosis.simulators.user_code import raised, silenced
 from toolkit.effects.law import TIME
 from toolkit.errors import FitError
@@ -81,13 +82,14 @@ class Equation:
         try:
             if self._takes_run is None:
                 self._takes_run = len(inspect.signature(self._initial).parameters) > 1
-            given = self._initial(dict(p), _as_dict(run)) if self._takes_run else self._initial(dict(p))
+            own = without_starts(p)
+            given = self._initial(own, _as_dict(run)) if self._takes_run else self._initial(own)
             start = np.atleast_1d(np.asarray(given, dtype=np.float64)).astype(np.float64)
         except (Exception, SystemExit) as error:
             raise self.failure("initial", error, run, p) from error
         if start.ndim > 1:
             raise failed(self.case, run, f"initial gives an array of shape {start.shape}, not one of states")
-        return start
+        return start + [p.get(start_name(i, run.name), 0.0) for i in range(len(start))]
 
     def begun(self, run: Run, start: Array, forces: Forces) -> Array:
         """Return the states that forces bring along at a run's first row, (added,)."""
@@ -97,7 +99,7 @@ class Equation:
     def failure(self, function: str, error: BaseException, run: Run, p: Mapping[str, float]) -> FitError:
         """Return the error of what a function of the file raised, with the names that it was given."""
         beside = {"run": tuple(_as_dict(run))} if function == "initial" else {"u": self._drivers}
-        return failed(self.case, run, f"{function}: {raised(error, p=p, **beside)}")
+        return failed(self.case, run, f"{function}: {raised(error, p=without_starts(p), **beside)}")
 
     def kinematics(self, p: Mapping[str, float]) -> dict[int, int]:
         """Return velocity state -> position state where one state's rate is another state as it is."""
@@ -183,7 +185,8 @@ class Equation:
 
     def rates_at(self, run: Run, p: Mapping[str, float], forces: Forces, own: int) -> RatesAt:
         """Return (times (m,), states (n, m)) -> their rates, forces among them."""
-        rate, columns = self.rates(run, dict(p), forces, own), self.columns
+        p = without_starts(p)
+        rate, columns = self.rates(run, p, forces, own), self.columns
 
         def by_row(t: Array, x: Array) -> Array:
             return np.stack([rate(at, x[:, k]) for k, at in enumerate(t.tolist())], axis=1)
@@ -204,7 +207,7 @@ class Equation:
         at_once = self._shown_together(run, p, x)
         if at_once is not None:
             return at_once
-        values, inputs = dict(p), self.inputs(run)
+        values, inputs = without_starts(p), self.inputs(run)
         rows: dict[str, list[float]] = {name: [] for name in self._shown}
         with silenced():
             for k in range(run.rows):
@@ -231,7 +234,7 @@ class Equation:
         if self._shown_columns is None:
             return None
         u = {name: run.columns[name] for name in self._drivers}
-        sets = {name: np.full(run.rows, value) for name, value in p.items()}
+        sets = {name: np.full(run.rows, value) for name, value in without_starts(p).items()}
         try:
             with silenced():
                 shown = self._shown_columns(run.t, np.ascontiguousarray(x), u, sets)

@@ -75,6 +75,8 @@ class Followed:
     whitened : how it shows in the prediction errors, (rows, outputs, outputs)
     entry : what a unit of rate in each own state does until the next row, (rows - 1, states, own states)
     spread : of the states, (states,)
+    starts : by what the states at every run's first row are off where they were put, (states, runs)
+    starts_sd : standard deviation of that, (states, runs)
     """
 
     states: Array
@@ -86,6 +88,8 @@ class Followed:
     whitened: Array
     entry: Array
     spread: Array
+    starts: Array
+    starts_sd: Array
 
     @property
     def log_scale(self) -> float:
@@ -110,7 +114,7 @@ class Followed:
         return np.asarray(answers if outputs is None else answers + self.whitened @ outputs)
 
 
-def following_shapes(rows: int, own: int, states: int, outputs: int) -> dict[str, tuple[int, ...]]:
+def following_shapes(rows: int, own: int, states: int, outputs: int, runs: int) -> dict[str, tuple[int, ...]]:
     """Return the shape of every field of `Followed`, by its name.
 
     Parameters
@@ -121,7 +125,8 @@ def following_shapes(rows: int, own: int, states: int, outputs: int) -> dict[str
         "states": (states, rows), "rates": (states, rows - 1), "errors": (rows, outputs),
         "closed": (rows - 1, states, states), "shows": (rows, outputs, states),
         "read": (rows - 1, states, outputs), "whitened": (rows, outputs, outputs),
-        "entry": (rows - 1, states, own), "spread": (states,),
+        "entry": (rows - 1, states, own), "spread": (states,), "starts": (states, runs),
+        "starts_sd": (states, runs),
     }  # fmt: skip
 
 
@@ -191,7 +196,7 @@ def follow(
             process, share = _likeliest(stretch, fastest, sensor, _SENSOR if steadier == 1 else _COLOURED)
             process /= steadier
         passed = _filter(stretch, process * fastest[None], share * sensor[None])
-        moved = _back(_smoothed(stretch, passed), slices)
+        moved = _back(_smoothed(stretch, passed)[0], slices)
         x = x + moved * spread[:, None]
         if np.abs(moved).max() < _SETTLED:
             break
@@ -199,6 +204,8 @@ def follow(
     stretch = _stretch(about, x, recorded, slices, spread)
     passed = _filter(stretch, process * fastest[None], share * sensor[None])
     inverse = np.asarray(np.linalg.inv(passed.roots), dtype=np.float64)
+    _, unsure = _smoothed(stretch, passed)
+    first = [rows.start for rows in slices]
     across = stretch.slopes @ passed.gains
 
     def whole(values: Array) -> Array:
@@ -217,6 +224,8 @@ def follow(
         whitened=whole(inverse),
         entry=about.entry,
         spread=spread,
+        starts=(x - guess)[:, first],
+        starts_sd=unsure.T * spread[:, None],
     )
 
 
@@ -308,13 +317,18 @@ def _filter(stretch: _Stretch, process: Array, sensor: Array, *, keep: bool = Tr
     return _Filtered(total, errors, roots, gains, predicted, predicted_spread, filtered, filtered_spread)
 
 
-def _smoothed(stretch: _Stretch, passed: _Filtered) -> Array:
-    """Return the states by all rows of their runs, (runs, rows, states)."""
-    x = passed.filtered.copy()
+def _smoothed(stretch: _Stretch, passed: _Filtered) -> tuple[Array, Array]:
+    """Return the states by all rows of their runs, (runs, rows, states), and how unsure the first ones are.
+
+    The standard deviations are (runs, states).
+    """
+    x, P = passed.filtered.copy(), passed.filtered_spread[:, -1]
     eye = _SINGULAR * np.eye(x.shape[2])
     for k in range(x.shape[1] - 2, -1, -1):
         across = stretch.slopes[:, k] @ passed.filtered_spread[:, k]
         weight = np.linalg.solve(passed.predicted_spread[:, k + 1] + eye, across)
         step = (x[:, k + 1] - passed.predicted[:, k + 1])[:, None]
         x[:, k] += (step @ weight)[:, 0]
-    return x
+        less = passed.predicted_spread[:, k + 1] - P
+        P = passed.filtered_spread[:, k] - weight.transpose(0, 2, 1) @ less @ weight
+    return x, np.sqrt(np.maximum(np.einsum("rnn->rn", P), 0.0))

@@ -24,6 +24,7 @@ from toolkit.diagnosis.simulators.ode_following import followed
 from toolkit.diagnosis.simulators.ode_responses import pushed
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
+from toolkit.diagnosis.simulators.run_starts import without_starts
 from toolkit.diagnosis.simulators.setting import is_speed, known_names, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
 from toolkit.diagnosis.simulators.states import (
@@ -335,7 +336,8 @@ class OdeModel:
         together, rows, terms = ForcesTogether(forces, own, runs), Rows(runs, self.drivers), forces[0].terms
         starts = [np.stack([self.equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
         atol = np.stack([self.tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
-        p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in listed[0][0]}
+        own_p = without_starts(listed[0][0])
+        p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in own_p}
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
         steps = np.ones(len(rows.t) - 1, dtype=np.intp)
         runs = tuple(map(self.recorded, runs))
@@ -397,7 +399,7 @@ class OdeModel:
         self, run: Run, p: Mapping[str, float], forces: Sequence[AppliedEffect], *, alone: bool
     ) -> NDArray[np.float64]:
         acting = self.forces(forces)
-        rate = self.equation.rates(run, dict(p), acting, len(self.states))
+        rate = self.equation.rates(run, without_starts(p), acting, len(self.states))
         start = self.equation.start(run, p)
         if run.rows == 1:
             return start[:, None]

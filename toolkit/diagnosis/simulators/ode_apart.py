@@ -154,7 +154,7 @@ class OdeApart:
         asked: Following,
     ) -> tuple[Followed, Array]:
         rows, outputs = sum(run.rows for run in runs), len(self.outputs)
-        shapes = following_shapes(rows, self._own, self._own + _MOST_ADDED * len(active), outputs)
+        shapes = following_shapes(rows, self._own, self._own + _MOST_ADDED * len(active), outputs, len(runs))
         shapes[_ANSWERS] = (rows, outputs, len(asked.steps))
         made = self._code.arrays(
             "followed", runs[0], p, shapes, _crossing(active), [self._code.number(run) for run in runs],
@@ -236,6 +236,7 @@ def handlers_of(case: Case, model: Model) -> Handlers:
             made.entry.shape[2],
             made.entry.shape[2] + _MOST_ADDED * len(active),
             made.errors.shape[1],
+            len(chosen),
         )
         arrays = Numbers({name: padded(getattr(made, name), shape) for name, shape in shapes.items()})
         arrays[_ANSWERS] = answers
