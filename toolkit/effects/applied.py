@@ -98,7 +98,7 @@ class AppliedEffect:
     signal that it takes, or the id of the record that replaces the named one. ``values`` are its parameters
     in their own units, with numbers of the computation that no fit moves among them; ``units`` is given where
     values are told in stated units. It acts in the runs of a ``condition``, else in those with the names
-    ``runs``, None for all.
+    ``runs``, None for all. One that is ``sized_as`` another of its form has that one's values.
     """
 
     effect: Effect
@@ -108,6 +108,7 @@ class AppliedEffect:
     values: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     condition: Condition | None = None
+    sized_as: EffectKey | None = None
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -119,8 +120,9 @@ class AppliedEffect:
 
     @property
     def searched(self) -> tuple[EffectParameter, ...]:
-        """Parameters that a fit moves: none of an effect that is there or not, or is read off the digits."""
-        return () if self.effect.discrete or self.effect.from_digits else self.effect.parameters
+        """Parameters that a fit moves: none of an effect that is there or not, or is read off elsewhere."""
+        fixed = self.effect.discrete or self.effect.from_digits or self.sized_as is not None
+        return () if fixed else self.effect.parameters
 
     def form_uncertainty(self, parameter: EffectParameter) -> float:
         """Return the standard uncertainty of a size whose law may be off by a share of what it does.

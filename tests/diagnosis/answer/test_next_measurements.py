@@ -41,6 +41,14 @@ def test_the_advice_is_about_what_the_mismatch_depends_on(variable, told):
     assert told in said
 
 
+def test_nobody_is_asked_to_drive_what_is_only_recorded():
+    """A pendulum that swings freely, with its rate recorded beside its angle."""
+    search = found("rate", "drate/dt")
+    search.problem.case.drivers = (Of(name="rate", unit="rad/s", role="covariate"),)
+    (said,) = to_find_it(search)
+    assert said.endswith("on rate, the rate of rate: record runs in which rate takes other values.")
+
+
 @pytest.mark.parametrize(
     ("levels", "told"),
     [

@@ -93,6 +93,10 @@ def initial(p):
 
 @pytest.fixture
 def losing(tmp_path):
+    return _losing(tmp_path, LOST)
+
+
+def _losing(tmp_path, lost):
     """Return a case of three bodies that lose heat to the room."""
     (tmp_path / "sim.py").write_text(APART)
     (tmp_path / "case.toml").write_text(
@@ -110,7 +114,7 @@ def losing(tmp_path):
 
         def rates(s, x, t=t, heat=heat, room=room):
             into = np.array([np.interp(s, t, each) for each in heat])
-            return (into - np.array(LOST) * (x - np.interp(s, t, room))) / 1000
+            return (into - np.array(lost) * (x - np.interp(s, t, room))) / 1000
 
         x = solve_ivp(rates, (0, t[-1]), [20.0] * 3, t_eval=t, rtol=1e-8, max_step=15).y
         x = x + rng.normal(0, 0.1, x.shape)
@@ -130,6 +134,27 @@ def test_what_all_bodies_lose_to_the_room_is_looked_at_as_one_law_in_all_of_thei
     assert lost[0].gain > 20
     sizes = [dict(applied.values)["a"] for applied in lost[0].together]
     assert min(sizes) > 0  # a loss, by its linear answer: a law is taken from the rate
+
+
+def test_of_bodies_that_are_alike_one_size_is_fitted(tmp_path):
+    """Three sizes would be as many ways to take the same for a gain or for another loss."""
+    losing = _losing(tmp_path, (0.9, 0.9, 0.9))
+    with running(losing, WORKER_LIMITS) as code:
+        problem = problem_of(losing, model_of(losing, None, code))
+        base = fit(problem)
+        trials = list(joint_terms_of(problem, base, LinearisedFit.of(problem, base)))
+        (lost,) = [
+            trial for trial in trials if trial.applied.effect.name == "law enters: a*([itself] - [room])"
+        ]
+        made = fit(problem, lost.together)
+    first = lost.applied.key
+    assert [part.applied.sized_as for part in lost.parts] == [None, first, first]
+    assert lost.cost == 1
+    sizes = {applied.values["a"] for applied in made.active}
+    assert len(sizes) == 1
+    sd = made.covariance[1, 1] ** 0.5
+    assert made.covariance.shape == (2, 2)  # the heat's factor, and one loss
+    assert abs(sizes.pop() - 0.9e-3) < 3 * sd < 0.1e-3
 
 
 @pytest.mark.campaign("30 s of a whole diagnosis: an exchange holds laws of several equations in every run")

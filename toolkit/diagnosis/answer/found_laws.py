@@ -130,6 +130,8 @@ def _memory(fitted: AppliedEffect) -> float | None:
 def _covariance(search: Search, law: Law, fitted: AppliedEffect) -> Array:
     """Return the covariance of a law's parameters, in their units."""
     augmented, at = search.augmented, len(search.problem.free)
+    if fitted.sized_as is not None:
+        fitted = next(applied for applied in augmented.active if applied.key == fitted.sized_as)
     if all(applied.key != fitted.key for applied in augmented.active):  # it explains, and is in no fit
         return np.diag([law.trial.sds.get(parameter.name, math.nan) ** 2 for parameter in fitted.searched])
     for applied in augmented.active:

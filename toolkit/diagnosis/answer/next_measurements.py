@@ -158,11 +158,12 @@ def zeros_to_read(search: Search) -> list[str]:
 
 
 def _sensors(search: Search) -> list[str]:
-    """Return that sensors' standard deviations are to be stated, where a rest was weighed as their noise."""
+    """Return that sensors' standard deviations are to be stated, where a rest may be their noise in part."""
     outputs = {output.name: output for output in search.problem.model.outputs}
     return [
         f"State the standard deviation of {name} (sd) in the case, from its sensor's certificate or a run at "
-        f"rest: {with_unit(f'{part.total_sd:.2g}', outputs[name].unit)} are left and were weighed as noise."
+        f"rest: how much of the {with_unit(f'{part.total_sd:.2g}', outputs[name].unit)} that are left is "
+        "noise, this recording does not tell."
         for name, part in beyond_noise(search.problem, search.augmented).items()
         if search.problem.stated_sd(name) is None and part.process_sd > part.sensor_sd
     ]
@@ -183,14 +184,21 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     )
     inputs = [channel.name for channel in case.drivers if channel.role == "input"]
     channels = {channel.name for channel in case.drivers}
-    rates = {f"d{name}/dt": f"the rate of {name}" for name in channels}
-    rates |= {f"way of {name}": f"the way of {name}" for name in channels}
-    varied = [rates.get(name, name) for name in variables if name in channels or name in rates]
+    of = {text: name for name in channels for text in (name, f"d{name}/dt", f"way of {name}")}
+    told = {f"d{name}/dt": f"the rate of {name}" for name in channels}
+    told |= {f"way of {name}": f"the way of {name}" for name in channels}
+    read = [name for name in variables if name in of]
+    listed = ", ".join(told.get(name, name) for name in read)
+    driven = next((name for name in read if of[name] in inputs), None)
     sentences = []
-    if varied:
+    if driven is not None:
         alone = "alone varied, everything else held" if len(channels) > 1 else "varied in another way"
         sentences.append(
-            f"{subject} depends on {', '.join(varied)}: repeat the run with {varied[0]} {alone}."
+            f"{subject} depends on {listed}: repeat the run with {told.get(driven, driven)} {alone}."
+        )
+    elif read:  # nobody drives what is only recorded
+        sentences.append(
+            f"{subject} depends on {listed}: record runs in which {of[read[0]]} takes other values."
         )
     outputs = [output for output in search.problem.model.outputs if output.name in variables]
     for is_load in (True, False):

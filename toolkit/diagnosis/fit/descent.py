@@ -344,7 +344,13 @@ class Space:
                 replace(applied, values={**applied.values, **dict(zip(names, values[at:], strict=False))})
             )
             at += len(names)
-        return values[:n], tuple(effects)
+        sizes = {applied.key: applied.values for applied in effects}
+        return values[:n], tuple(
+            replace(applied, values={**applied.values, **sizes.get(applied.sized_as, {})})
+            if applied.sized_as is not None
+            else applied
+            for applied in effects
+        )
 
     def simulated(self, x: Array) -> Stacked:
         """Return every output over all runs.

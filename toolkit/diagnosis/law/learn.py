@@ -384,7 +384,7 @@ def _is_told_from_none(refit: Fit, trust: float, count: int = 1) -> bool:
     """
     from scipy.stats import chi2
 
-    sizes = [sizes_off(refit, applied) for applied in refit.active[-count:]]
+    sizes = [sizes_off(refit, applied) for applied in refit.active[-count:] if applied.searched]
     return all(own and away * trust > float(chi2.ppf(VERDICT.interval, len(own))) for away, own in sizes)
 
 

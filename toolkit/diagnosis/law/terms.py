@@ -8,6 +8,7 @@ a coarse grid finds them where the simulation rings, each period being a hill.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -109,17 +110,30 @@ def joint_terms_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterat
 
 
 def _joined(problem: Problem, base: Fit, screen: LinearisedFit, trials: Sequence[Trial]) -> Trial | None:
-    """Return laws as one of several equations, with its gain; None where one of them moves nothing."""
-    answered = list(all_responses(problem, base, trials))
-    if any(each is None for each in answered):
+    """Return laws as one of several equations, with its gain; None where one of them moves nothing.
+
+    Along a rod, or in a row of cells that are alike, no place has a size of its own: where each reads its own
+    state, one size is for all of them unless sizes of their own gain what these cost.
+    """
+    answered = [each for each in all_responses(problem, base, trials) if each is not None]
+    if len(answered) < len(trials):
         return None
-    stacked = {
-        name: np.hstack([each[name] for each in answered if each is not None]) for name in problem.names
-    }
-    gain, sizes, trust = screen.gain(stacked)
+    own = {name: np.hstack([each[name] for each in answered]) for name in problem.names}
+    gain, sizes, trust = screen.gain(own)
+    tied: Trial | None = None
+    if trials[0].signals != trials[1].signals:
+        one = {name: column.sum(axis=1, keepdims=True) for name, column in own.items()}
+        gain_of_one, size, trust_of_one = screen.gain(one)
+        dearer = math.log(max(problem.values, 1.0)) * (len(trials) - 1)
+        if gain * trust - dearer < gain_of_one * trust_of_one:
+            gain, sizes, trust, tied = gain_of_one, size * len(trials), trust_of_one, trials[0]
     joined = None
-    for trial, size in zip(reversed(trials), reversed(list(sizes)), strict=True):
-        joined = replace(at_coefficients(trial, [size]), partner=joined, gain=gain * trust)
+    for trial, own_size in zip(reversed(trials), reversed(sizes), strict=True):
+        as_first = None if tied is None or trial is tied else tied.applied.key
+        made = at_coefficients(trial, [own_size])
+        joined = replace(
+            made, applied=replace(made.applied, sized_as=as_first), partner=joined, gain=gain * trust
+        )
     return joined
 
 

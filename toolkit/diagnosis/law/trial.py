@@ -90,7 +90,8 @@ class Trial:
     ``unit`` is that of what it adds, or of its factor. ``swayed`` is, of a law that scales what drives a
     tire, how every output answers to its factor, (rows,). ``looked`` counts the laws that were looked at to
     find it: its p-value is among as many. ``sds`` are standard deviations of parameters that no fit has.
-    ``partner`` is the same law in another equation, which may have one: what one body loses the other has.
+    ``partner`` is the same law in another equation, which may have one: what one body loses the other has. It
+    has a size of its own, or that of the first.
     """
 
     shape: Shape
@@ -133,7 +134,7 @@ class Trial:
     @property
     def cost(self) -> int:
         """Number of its parameters."""
-        return sum(len(applied.effect.parameters) for applied in self.together)
+        return sum(len(applied.searched) for applied in self.together)
 
 
 def amplitudes(applied: AppliedEffect) -> tuple[str, ...]:

@@ -432,7 +432,8 @@ def _rejected(result: Result) -> Table:
         tests = max(len(search.scored), 1)
         for trial in best_of(search.scored)[:_NEAREST]:
             gain = trial.gain * trial.trust
-            if gain < float(chi2.isf(SCREENING.alpha / tests, trial.dof)):
+            shows = trial.candidate.name in search.undecided
+            if not shows and gain < float(chi2.isf(SCREENING.alpha / tests, trial.dof)):
                 why = "no more than chance gives in a search of this size"
             elif search.skipped:
                 why = "the budget was spent before it was tried to the end"
