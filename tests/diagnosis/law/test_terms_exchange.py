@@ -150,7 +150,7 @@ def test_of_bodies_that_are_alike_one_size_is_fitted(tmp_path):
     first = lost.applied.key
     assert [part.applied.sized_as for part in lost.parts] == [None, first, first]
     assert lost.cost == 1
-    sizes = {applied.values["a"] for applied in made.active}
+    sizes = {dict(applied.values)["a"] for applied in made.active}
     assert len(sizes) == 1
     sd = made.covariance[1, 1] ** 0.5
     assert made.covariance.shape == (2, 2)  # the heat's factor, and one loss
