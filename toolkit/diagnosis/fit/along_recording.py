@@ -1,10 +1,11 @@
 """A fit's equation led along its recording, and where that starts each run.
 
 ``initial`` puts the states at a run's first row where a case says, and what it says is often read off one
-noisy row, off a difference of rows, or is a rate that nobody recorded. A free simulation carries that error
-through the whole run: a body that swings keeps the wrong swing. Led along its recording, an equation starts
-where the recording goes on from, whatever it lacks later. A run that starts elsewhere by more than either can
-tell, and shows it, has starts of its own from then on: nuisances, which name no physics.
+noisy row, or off a difference of rows that is half a row late. A free simulation carries that error through
+the whole run: a body that swings keeps the wrong swing. Led along its recording, an equation starts where the
+recording goes on from, whatever it lacks later. A run that starts elsewhere by more than either can tell, and
+shows it, has starts of its own from then on: nuisances, which name no physics. A start that a case states is
+one of its statements: where every run starts by as much beside it, a gauge's zero is as likely.
 """
 
 from __future__ import annotations
@@ -78,7 +79,8 @@ def with_run_starts(problem: Problem, base: Fit) -> Problem:
         return problem
     (followed, _), own = made, len(moving.states)
     off, sd = followed.starts[:own], np.maximum(followed.starts_sd[:own], 1e-9 * followed.spread[:own, None])
-    far = np.abs(off / sd) > norm.isf(SCREENING.alpha / (2 * off.size))
+    read = np.array([state.begins_read for state in moving.states], dtype=bool)
+    far = read[:, None] & (np.abs(off / sd) > norm.isf(SCREENING.alpha / (2 * off.size)))
     starts = {
         k: [
             RunStart(
@@ -86,6 +88,7 @@ def with_run_starts(problem: Problem, base: Fit) -> Problem:
                 value=float(off[i, k]), sd=float(sd[i, k]),
             )
             for i, state in enumerate(moving.states)
+            if read[i]
         ]
         for k, run in enumerate(problem.runs)
         if far[:, k].any()

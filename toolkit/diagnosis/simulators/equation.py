@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from toolkit.effects.law import TIME
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.simulators.columnwise import Columnwise
@@ -90,6 +93,15 @@ class Equation:
         if start.ndim > 1:
             raise failed(self.case, run, f"initial gives an array of shape {start.shape}, not one of states")
         return start + [p.get(start_name(i, run.name), 0.0) for i in range(len(start))]
+
+    def begins_read(self, p: Mapping[str, float]) -> NDArray[np.bool_]:
+        """Return which states start where a channel's first row says, (states,)."""
+        run = self.case.runs[0]
+        start = self.start(run, p)
+        columns = {name: x + (1e-6 * float(np.ptp(x)) or 1e-6) for name, x in run.columns.items()}
+        with contextlib.suppress(FitError):  # nobody promises a start from other values
+            return np.asarray(self.start(replace(run, columns=columns), p) != start)
+        return np.zeros(len(start), dtype=bool)
 
     def begun(self, run: Run, start: Array, forces: Forces) -> Array:
         """Return the states that forces bring along at a run's first row, (added,)."""

@@ -24,7 +24,7 @@ from toolkit.diagnosis.simulators.ode_following import followed
 from toolkit.diagnosis.simulators.ode_responses import pushed
 from toolkit.diagnosis.simulators.parameter_units import reduced
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
-from toolkit.diagnosis.simulators.run_starts import without_starts
+from toolkit.diagnosis.simulators.run_starts import in_columns, without_starts
 from toolkit.diagnosis.simulators.setting import is_speed, known_names, nominal_load, setting
 from toolkit.diagnosis.simulators.simulator import Capability, Moving, Output, StateRange
 from toolkit.diagnosis.simulators.states import (
@@ -118,7 +118,8 @@ class OdeModel:
             together=self._prepare,
             motion=Moving(
                 integrates=True, sizes=self._motion_sizes, units=self._motion_units, way=self._way,
-                position=lambda channel: self.position_of(str(channel)), states=self._ranges(),
+                position=lambda channel: self.position_of(str(channel)),
+                states=self._ranges(self.equation.begins_read(p)),
                 pushed=lambda run, p, active, channel, pattern: pushed(
                     self, self._as_driven(run, active), p, active, channel, pattern
                 ),
@@ -196,7 +197,7 @@ class OdeModel:
         # A velocity has its way for a position, even where no state is one; any other state is its own.
         return force, speed, f"{speed}*s" if is_speed(speed) else speed
 
-    def _ranges(self) -> tuple[StateRange, ...]:
+    def _ranges(self, begins_read: NDArray[np.bool_]) -> tuple[StateRange, ...]:
         """Return the states; one whose unit neither the recording nor a rate of it tells has none."""
         implied: dict[str, str] = {}
         for name in self.force_units:
@@ -206,9 +207,9 @@ class OdeModel:
         return tuple(
             StateRange(
                 name=name, unit=reduced(implied.get(name) or self._units.get(name, "1")),
-                quantiles=tuple(levels.tolist()),
+                quantiles=tuple(levels.tolist()), begins_read=bool(read),
             )
-            for name, levels in zip(self.states, self._levels, strict=True)
+            for name, levels, read in zip(self.states, self._levels, begins_read, strict=True)
         )  # fmt: skip
 
     def _way(self, channel: str | None) -> tuple[float, float]:
@@ -336,8 +337,7 @@ class OdeModel:
         together, rows, terms = ForcesTogether(forces, own, runs), Rows(runs, self.drivers), forces[0].terms
         starts = [np.stack([self.equation.start(run, p) for p, _ in listed], axis=1) for run in runs]
         atol = np.stack([self.tolerance(starts[0][:, 0], force, together.added) for force in forces], axis=1)
-        own_p = without_starts(listed[0][0])
-        p = {name: np.array([values[name] for values, _ in listed], dtype=float) for name in own_p}
+        p = in_columns([values for values, _ in listed])
         x = np.zeros((own + together.added, len(listed), len(rows.t)))
         steps = np.ones(len(rows.t) - 1, dtype=np.intp)
         runs = tuple(map(self.recorded, runs))

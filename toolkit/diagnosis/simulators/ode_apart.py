@@ -191,7 +191,9 @@ def handlers_of(case: Case, model: Model) -> Handlers:
                 moving.position(channel),
                 motion.feeds,
             ]
-        ranges = [[state.name, state.unit, list(state.quantiles)] for state in moving.states]
+        ranges = [
+            [state.name, state.unit, list(state.quantiles), state.begins_read] for state in moving.states
+        ]
         return [places, motions, ranges]
 
     def prepared(
@@ -279,8 +281,13 @@ def _facts_of(facts: Any) -> tuple[dict[str, list[Place]], dict[str, _Motion], t
             places[name] = [(_text(channel), _text(source)) for channel, source in listed[name]]
         motions = {str(channel): _motion(*parts) for channel, parts in moving.items()}
         states = tuple(
-            StateRange(name=str(name), unit=str(text), quantiles=tuple(map(float, quantiles)))
-            for name, text, quantiles in ranges
+            StateRange(
+                name=str(name),
+                unit=str(text),
+                quantiles=tuple(map(float, quantiles)),
+                begins_read=bool(read),
+            )
+            for name, text, quantiles, read in ranges
         )
         missing = {str(channel) for pairs in places.values() for channel, _ in pairs} - set(motions)
     except (TypeError, ValueError, KeyError, AttributeError) as error:

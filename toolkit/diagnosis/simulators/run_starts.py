@@ -6,8 +6,14 @@ noisy row, or a rate that nobody recorded. A free simulation carries that error 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from toolkit.arrays import Array
 
 _AT_START = " at the start of "  # no parameter of a case has spaces in its name
 
@@ -37,6 +43,11 @@ class RunStart:
 def start_name(state: int, run: str) -> str:
     """Return the name of the start of a run's state, by the state's place among the states."""
     return f"{state}{_AT_START}{run}"
+
+
+def in_columns(sets: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """Return what several sets have of every parameter that a case's own functions know, (sets,) each."""
+    return {name: np.array([each[name] for each in sets], dtype=float) for name in without_starts(sets[0])}
 
 
 def without_starts(p: Mapping[str, float]) -> dict[str, float]:

@@ -77,11 +77,15 @@ class Output:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateRange:
-    """A state of an equation: name, unit, and quantiles of its values in the simulation as declared."""
+    """A state of an equation: name, unit, and quantiles of its values in the simulation as declared.
+
+    ``begins_read`` tells that a case reads its start off the first row of each run.
+    """
 
     name: str
     unit: str
     quantiles: tuple[float, ...]
+    begins_read: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,7 +21,7 @@ from toolkit.diagnosis.simulators.forces import ForcesTogether
 from toolkit.diagnosis.simulators.integrate import OFF, RTOL
 from toolkit.diagnosis.simulators.marching import flows, neighbours_on
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
-from toolkit.diagnosis.simulators.run_starts import without_starts
+from toolkit.diagnosis.simulators.run_starts import in_columns
 from toolkit.diagnosis.simulators.trajectory import recursion
 from toolkit.diagnosis.simulators.user_code import silenced
 
@@ -74,9 +74,7 @@ class Turning:
             starts[:own, :, k] = np.stack([model.equation.start(run, values) for values, _ in listed], axis=1)
             for i, one in enumerate(acting):
                 starts[own : own + one.added, i, k] = model.equation.begun(run, starts[:own, i, k], one)
-        values = {
-            name: np.array([each[name] for each, _ in listed], dtype=float) for name in without_starts(p)
-        }
+        values = in_columns([each for each, _ in listed])
         atol = np.stack([model.tolerance(starts[:own, 0, 0], one, one.added) for one in acting], axis=1)
         flow = RowFlow(columns, rows, values, together, atol)
         sizes = np.array([*(model.scale[name][1] for name in model.states), *acting[0].sizes])
