@@ -99,11 +99,10 @@ class OdeModel:
         p = {parameter.name: parameter.value for parameter in case.parameters}
         start = self.equation.start(case.runs[0], p)
         self.states = names = state_names(case, len(start))
-        terms = dict(case.simulation.force_terms)
         self.derivative_of = self.equation.kinematics(p)
         # A place moves nothing into its own rate.
         self.feeds = {i: j for i, j in self.equation.feeds(p).items() if self.derivative_of.get(j) != i}
-        self.force_units = terms or {
+        self.force_units = dict(case.simulation.force_terms) or {
             name: "" for i, name in enumerate(names) if i not in self.derivative_of.values()
         }
         self.scale: dict[str, tuple[float, float]] = {}

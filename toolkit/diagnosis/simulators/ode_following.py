@@ -11,7 +11,7 @@ from toolkit.diagnosis.simulators.channels import slopes, through_channels
 from toolkit.diagnosis.simulators.following import Followed, Linear, follow
 from toolkit.diagnosis.simulators.forces import ForcesTogether
 from toolkit.diagnosis.simulators.row_flow import RowFlow, Rows
-from toolkit.diagnosis.simulators.run_starts import without_starts
+from toolkit.diagnosis.simulators.run_starts import in_columns
 from toolkit.diagnosis.simulators.trajectory import flow_slopes
 from toolkit.diagnosis.simulators.user_code import silenced
 from toolkit.errors import FitError
@@ -59,12 +59,9 @@ def followed(
 
     def flow(sets: Sequence[Mapping[str, float]]) -> RowFlow:
         together = ForcesTogether([acting] * len(sets), len(model.states), runs)
-        columns = {
-            name: np.array([values[name] for values in sets], dtype=float) for name in without_starts(sets[0])
-        }
         assert model.equation.columns is not None  # noqa: S101  asked above
         atol = _STEP * np.repeat(spread[:, None], len(sets), axis=1)
-        return RowFlow(model.equation.columns, rows, columns, together, atol)
+        return RowFlow(model.equation.columns, rows, in_columns(sets), together, atol)
 
     def shown(x: Array, values: Mapping[str, float]) -> Array:
         parts = []
