@@ -7,9 +7,14 @@ ILAC-P14:09/2020): wherever people read both, they are made by the functions her
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from functools import lru_cache
+
+import numpy as np
+
+from toolkit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,23 +67,41 @@ def coverage_factor(dof: float, probability: float = 0.95) -> float:
     >>> round(coverage_factor(math.inf), 4)
     1.96
     """
+    return float(coverage_factors(np.array(dof), probability))
+
+
+def coverage_factors(dof: Array, probability: float = 0.95) -> Array:
+    """Return `coverage_factor` of every number of degrees of freedom (any shape).
+
+    >>> coverage_factors(np.array([0.5, 1.0, 10.7, math.inf])).round(3).tolist()
+    [nan, 12.706, 2.228, 1.96]
+    """
     from scipy.special import ndtri, stdtrit
 
     tail = 0.5 + probability / 2
-    if math.isnan(dof) or dof < 1 - 1e-9:
-        return math.nan
-    return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(math.floor(dof * (1 + 1e-9)), tail))
+    whole = np.floor(dof * (1 + 1e-9))
+    # Of rows of a file most have the same few.
+    distinct, place = np.unique(np.where(dof < 1 - 1e-9, np.nan, whole), return_inverse=True)
+    factors = np.where(np.isinf(distinct), ndtri(tail), stdtrit(distinct, tail))
+    return np.asarray(factors[place].reshape(np.shape(dof)))
 
 
-def effective_dof(contributions: list[tuple[float, float]]) -> float:
+def effective_dof(contributions: Sequence[tuple[float, float]]) -> float:
     """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i) (GUM G.4.1).
 
     >>> effective_dof([(3.0, 10.0), (4.0, math.inf)])
     77.16049382716...
     """
-    total = sum(u * u for u, _ in contributions)
-    bottom = sum(u**4 / dof for u, dof in contributions if not math.isinf(dof))
-    return math.inf if bottom == 0 else total * total / bottom
+    return float(effective_dofs(contributions))
+
+
+def effective_dofs(contributions: Sequence[tuple[Array | float, Array | float]]) -> Array:
+    """Return `effective_dof` of contributions at many points, each an array (points,) or a scalar one."""
+    total = np.asarray(sum(u * u for u, _ in contributions))
+    # What is known for certain takes nothing away: it is divided by infinity.
+    bottom = np.asarray(sum(u**4 / dof for u, dof in contributions))
+    certain = np.full(bottom.shape, math.inf)
+    return np.asarray(np.divide(total * total, bottom, out=certain, where=bottom != 0))
 
 
 _MANY = 1e6  # degrees of freedom from which Student's t is the normal quantile to six digits
