@@ -35,8 +35,10 @@ class SaidOnce(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the options and arguments of a call."""
-        values, _, given = self.make_parser(ctx).parse_args(args=list(args))
-        for parameter in self.params:
+        read: tuple[dict[str, Any], Any, list[Any]] = self.make_parser(ctx).parse_args(args=list(args))
+        values, _, given = read
+        parameters: list[Any] = self.params
+        for parameter in parameters:
             word = values.get(parameter.name)
             if parameter.name in self._paths and "" in (word if isinstance(word, list | tuple) else (word,)):
                 # It would be the working folder: of a variable of the shell that is not set.

@@ -14,15 +14,15 @@ def coarse_decimals(style: Style, words: Vocabulary) -> Iterator[LintFinding]:
 
     Decimals by unit hold for that unit alone; those of a tag or a column hold whatever the unit is.
     """
-    printed = {entry.path: ((entry.path,), entry.unit, entry.spec) for entry in words.values}
-    printed |= {
-        f"{name}.{column.name}": ((f"{name}.{column.name}", column.name), column.unit, column.spec)
+    printed = [([entry.path], entry.unit, entry.spec) for entry in words.values]
+    printed += [
+        ([f"{name}.{column.name}", column.name], column.unit, column.spec)
         for name, table in words.tables.items()
         for column in table.columns
         if column.quantity
-    }
+    ]
     said = set()
-    for names, stated_in, spec in printed.values():
+    for names, stated_in, spec in printed:
         unit, factor = style.unit(stated_in)
         digits, needed = style.digits(*names), kept(spec, factor)
         name = next((name for name in names if style.digits(name) is not None), "")
