@@ -209,7 +209,9 @@ def _xlsx(columns: Table, use: CalibrationUse, path: Path) -> None:
     book.properties.creator, book.properties.title = GENERATOR, use.mark or f"loads by {use.id}"
     book.properties.keywords = f"{OWN_OUTPUT}; {mark_line(use)}"
     book.properties.created = book.properties.modified = STAMP
-    book.save(path)
+    stream = io.BytesIO()  # packed; on a full disk an archive that is open says so once more as it goes
+    book.save(stream)
+    path.write_bytes(stream.getvalue())
 
 
 def _parquet_table(columns: Table, use: CalibrationUse, path: Path) -> None:
