@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from toolkit.arrays import Array
+if TYPE_CHECKING:
+    from toolkit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,41 +67,33 @@ def coverage_factor(dof: float, probability: float = 0.95) -> float:
     >>> round(coverage_factor(math.inf), 4)
     1.96
     """
-    return float(coverage_factors(np.array(dof), probability))
+    return float(coverage_factors(dof, probability))
 
 
-def coverage_factors(dof: Array, probability: float = 0.95) -> Array:
-    """Return `coverage_factor` of every number of degrees of freedom (any shape).
-
-    >>> coverage_factors(np.array([0.5, 1.0, 10.7, math.inf])).round(3).tolist()
-    [nan, 12.706, 2.228, 1.96]
-    """
+def coverage_factors(dof: Array | float, probability: float = 0.95) -> Array:
+    """Return `coverage_factor` of every number of degrees of freedom (any shape)."""
+    import numpy as np
     from scipy.special import ndtri, stdtrit
 
     tail = 0.5 + probability / 2
-    whole = np.floor(dof * (1 + 1e-9))
     # Of rows of a file most have the same few.
-    distinct, place = np.unique(np.where(dof < 1 - 1e-9, np.nan, whole), return_inverse=True)
+    whole = np.where(np.less(dof, 1 - 1e-9), np.nan, np.floor(np.multiply(dof, 1 + 1e-9)))
+    distinct, place = np.unique(whole, return_inverse=True)
     factors = np.where(np.isinf(distinct), ndtri(tail), stdtrit(distinct, tail))
     return np.asarray(factors[place].reshape(np.shape(dof)))
 
 
-def effective_dof(contributions: Sequence[tuple[float, float]]) -> float:
-    """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i) (GUM G.4.1).
+def effective_dof(contributions: Sequence[tuple[Array | float, Array | float]]) -> Array:
+    """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i), at many points (GUM G.4.1).
 
-    >>> effective_dof([(3.0, 10.0), (4.0, math.inf)])
+    >>> float(effective_dof([(3.0, 10.0), (4.0, math.inf)]))
     77.16049382716...
     """
-    return float(effective_dofs(contributions))
+    import numpy as np
 
-
-def effective_dofs(contributions: Sequence[tuple[Array | float, Array | float]]) -> Array:
-    """Return `effective_dof` of contributions at many points, each an array (points,) or a scalar one."""
     total = np.asarray(sum(u * u for u, _ in contributions))
-    # What is known for certain takes nothing away: it is divided by infinity.
-    bottom = np.asarray(sum(u**4 / dof for u, dof in contributions))
-    certain = np.full(bottom.shape, math.inf)
-    return np.asarray(np.divide(total * total, bottom, out=certain, where=bottom != 0))
+    bottom = np.asarray(sum(u**4 / dof for u, dof in contributions))  # of what is certain, nothing
+    return np.where(bottom == 0, math.inf, total * total / np.where(bottom == 0, 1.0, bottom))
 
 
 _MANY = 1e6  # degrees of freedom from which Student's t is the normal quantile to six digits

@@ -27,7 +27,7 @@ from toolkit.calibration.uncertainty.components import components_of
 from toolkit.calibration.uncertainty.model import Budget, Contribution, Temperature
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 from toolkit.errors import SessionError
-from toolkit.estimate import coverage_factors, effective_dofs
+from toolkit.estimate import coverage_factors, effective_dof
 
 PROBABILITY = 0.95
 _AT_A_TIME = 1 << 12  # rows whose budgets are made together: some megabytes
@@ -211,7 +211,7 @@ def combine(
 ) -> tuple[Array, Array, Array, Array]:
     """Return (u, dof, k, U) of independent (u_i, dof_i) at many points: JCGM 100 eq. 10, G.2b, G.6.4."""
     u = np.sqrt(np.asarray(sum(u * u for u, _ in contributions)))
-    dof = effective_dofs(contributions)
+    dof = effective_dof(contributions)
     k = coverage_factors(dof, probability)
     return u, dof, k, k * u
 
