@@ -207,3 +207,32 @@ def test_brackets_about_a_scale_leave_its_zero_and_a_space_in_it_is_refused() ->
     assert unit("(degC)").offset == pytest.approx(273.15)
     with pytest.raises(UnitError):
         unit("mV/deg C")
+
+
+@pytest.mark.parametrize("prefix", ["", "m", "c", "da", "h", "k", "M", "µ", "u"])
+@pytest.mark.parametrize("length", ["m", "mm", "cm"])
+def test_a_newton_metre_in_one_word_is_a_moment_by_any_prefix(prefix: str, length: str) -> None:
+    """pint reads Nm as a measure of yarn, [length]/[mass]: mNm of a small cell had been one."""
+    assert unit(f"{prefix}N{length}") == unit(f"{prefix}N*{length}")
+    assert unit(f"{prefix}N{length}").dimension == "moment"
+    assert unit(f"{prefix}N{length}/deg").dimension == unit("N*m/deg").dimension
+
+
+@pytest.mark.parametrize("text", ["gon", "urad", "arcsecond", "arcmin", "mrad", "turn", "deg", "cycle"])
+def test_what_is_a_number_of_radians_is_an_angle(text: str) -> None:
+    assert (unit(text).dimension, unit(text).si) == ("angle", "rad")
+
+
+@pytest.mark.parametrize("text", ["grad", "Grad", "Grad/s", "N*m/grad", "grade"])
+def test_a_word_of_two_meanings_is_refused(text: str) -> None:
+    """German and French headers say grad of a degree, pint of 0.9 of one."""
+    with pytest.raises(UnitError):
+        unit(text)
+
+
+def test_words_of_other_workshops() -> None:
+    assert unit("U/min").factor == unit("rpm").factor  # Umdrehungen; pint's U is an enzyme's
+    assert unit("PS").factor == pytest.approx(735.49875)  # DIN 66036; pint's a petasiemens
+    assert unit("pct").factor == 0.01  # a picocarat
+    assert unit("mV / V") == unit("mV/V")
+    assert unit("N * m") == unit("N*m")

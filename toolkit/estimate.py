@@ -7,9 +7,14 @@ ILAC-P14:09/2020): wherever people read both, they are made by the functions her
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_HALF_EVEN, Decimal
 from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from toolkit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,23 +67,33 @@ def coverage_factor(dof: float, probability: float = 0.95) -> float:
     >>> round(coverage_factor(math.inf), 4)
     1.96
     """
+    return float(coverage_factors(dof, probability))
+
+
+def coverage_factors(dof: Array | float, probability: float = 0.95) -> Array:
+    """Return `coverage_factor` of every number of degrees of freedom (any shape)."""
+    import numpy as np
     from scipy.special import ndtri, stdtrit
 
     tail = 0.5 + probability / 2
-    if math.isnan(dof) or dof < 1 - 1e-9:
-        return math.nan
-    return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(math.floor(dof * (1 + 1e-9)), tail))
+    # Of rows of a file most have the same few.
+    whole = np.where(np.less(dof, 1 - 1e-9), np.nan, np.floor(np.multiply(dof, 1 + 1e-9)))
+    distinct, place = np.unique(whole, return_inverse=True)
+    factors = np.where(np.isinf(distinct), ndtri(tail), stdtrit(distinct, tail))
+    return np.asarray(factors[place].reshape(np.shape(dof)))
 
 
-def effective_dof(contributions: list[tuple[float, float]]) -> float:
-    """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i) (GUM G.4.1).
+def effective_dof(contributions: Sequence[tuple[Array | float, Array | float]]) -> Array:
+    """Return the Welch-Satterthwaite degrees of freedom of (u_i, dof_i), at many points (GUM G.4.1).
 
-    >>> effective_dof([(3.0, 10.0), (4.0, math.inf)])
+    >>> float(effective_dof([(3.0, 10.0), (4.0, math.inf)]))
     77.16049382716...
     """
-    total = sum(u * u for u, _ in contributions)
-    bottom = sum(u**4 / dof for u, dof in contributions if not math.isinf(dof))
-    return math.inf if bottom == 0 else total * total / bottom
+    import numpy as np
+
+    total = np.asarray(sum(u * u for u, _ in contributions))
+    bottom = np.asarray(sum(u**4 / dof for u, dof in contributions))  # of what is certain, nothing
+    return np.where(bottom == 0, math.inf, total * total / np.where(bottom == 0, 1.0, bottom))
 
 
 _MANY = 1e6  # degrees of freedom from which Student's t is the normal quantile to six digits

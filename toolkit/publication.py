@@ -108,7 +108,14 @@ def publication(folder: Path) -> Iterator[Path]:
 
 
 def write_result(path: Path, data: bytes | str) -> None:
-    """Write the only result of a command: one file needs no more than one rename.
+    """Write the only result of a command: one file needs no more than one rename; errors as `result_file`."""
+    with result_file(path) as staged:
+        staged.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+@contextlib.contextmanager
+def result_file(path: Path) -> Iterator[Path]:
+    """Yield where the only result of a command is to be written, piece by piece or at once.
 
     Raises
     ------
@@ -117,7 +124,7 @@ def write_result(path: Path, data: bytes | str) -> None:
     """
     try:
         with publication(path.parent) as stage:
-            (stage / path.name).write_bytes(data.encode() if isinstance(data, str) else data)
+            yield stage / path.name
     except OutputError as error:
         error.where = str(path)
         raise

@@ -51,20 +51,14 @@ _SPELLINGS = {
     "ft*lb": "force_pound*foot",
     "ft lbf": "force_pound*foot",
     "ft*lbf": "force_pound*foot",
-    "klbf": "1000*force_pound",
-    "kip": "1000*force_pound",
-    "Nm": "newton*meter",
     "N-m": "newton*meter",
     "N m": "newton*meter",
     "N*m": "newton*meter",
-    "kNm": "kilonewton*meter",
     "kN*m": "kilonewton*meter",
     "mV/V": "1e-3*bridge_ratio",
     "µV/V": "1e-6*bridge_ratio",
     "uV/V": "1e-6*bridge_ratio",
     "V/V": "bridge_ratio",
-    "count": "digitiser_count",
-    "counts": "digitiser_count",
     "°": "degree",
     "degC": "degC",
     "°C": "degC",
@@ -73,30 +67,32 @@ _SPELLINGS = {
     "°F": "degF",
     "psi": "psi",
     "km/h": "kilometer/hour",
-    "kph": "kilometer/hour",
-    "kmh": "kilometer/hour",
-    "mph": "mile/hour",
     "1": "dimensionless",
     "-": "dimensionless",
     "none": "dimensionless",
     "": "dimensionless",
     "%": "0.01*dimensionless",
     "rev": "turn",
+    "U/min": "turn/minute",
 }
 
 # What a word means inside a compound as well: pint's pound is a mass, its Nm no moment.
 _WORDS = {
     **dict.fromkeys(("lb", "lbs", "lbf"), "force_pound"), "klbf": "(1000*force_pound)",
     "kip": "(1000*force_pound)", "kp": "kilogram_force", "kips": "(1000*force_pound)",
-    "Nm": "(newton*meter)", "Ncm": "(newton*centimeter)", "Nmm": "(newton*millimeter)",
-    "kNm": "(kilonewton*meter)", "kph": "(kilometer/hour)", "kmh": "(kilometer/hour)",
-    "mph": "(mile/hour)", "rev": "turn", "counts": "digitiser_count", "count": "digitiser_count",
+    "kph": "(kilometer/hour)", "kmh": "(kilometer/hour)", "mph": "(mile/hour)", "rev": "turn",
+    "counts": "digitiser_count", "count": "digitiser_count", "PS": "metric_horsepower", "pct": "percent",
     **dict.fromkeys(("Ohm", "Ohms"), "ohm"), "kOhm": "kiloohm", "MOhm": "megaohm", "mOhm": "milliohm",
     **dict.fromkeys(("Volt", "Volts"), "volt"), **dict.fromkeys(("Amp", "Amps", "Ampere"), "ampere"),
     **dict.fromkeys(("Watt", "Watts"), "watt"), "Farad": "farad", "Henry": "henry", "Siemens": "siemens",
 }  # fmt: skip
-_WRITTEN = {"lb": "lbf", "lbs": "lbf", "kp": "kgf", "Nm": "N*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m"}
+_WRITTEN = {"lb": "lbf", "lbs": "lbf", "kp": "kgf"}
 _WORD = re.compile(r"[^\W\d_]+")
+# A newton metre as one word, with any prefix: pint's Nm is a measure of yarn, its mNm the thousandth of one.
+_MOMENT = re.compile(r"((?:da|[GMkhcmµu])?N)([ckm]?m)")
+# A degree to those who speak German or French, a hundredth of a right angle to pint: not read as either.
+_TWO_MEANINGS = frozenset({"grad", "Grad", "grade", "grads", "Grade"})
+_AROUND = re.compile(r"\s*([*/])\s*")
 _HYPHEN = re.compile(r"(?<=[^\W\d_])\s*-\s*(?![CF]\b)(?=[^\W\d_])")  # lbf-in, N-m/deg: a product
 
 # How the toolkit writes a unit, whatever the spelling that was read.
@@ -104,10 +100,9 @@ _CANONICAL = {
     "lb": "lbf", "lbs": "lbf", "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad",
     "radians": "rad", "°C": "degC", "C": "degC", "°F": "degF", "counts": "count", "kph": "km/h",
     "kmh": "km/h", "-": "1", "": "1", "newton": "N", "newtons": "N", "second": "s", "seconds": "s",
-    "none": "1", "uV/V": "µV/V", "kNm": "kN*m",
+    "none": "1", "uV/V": "µV/V",
 }  # fmt: skip
 
-_ANGLES = ("degree", "radian", "turn", "arcminute", "milliradian")
 # Also refused: a number to a power, which no unit needs and which can be made to compute for ever.
 _NEVER_GUESSED = re.compile(r"[^\w\s*/^.()·°µ%+-]|\d\s*\)?\s*(\*\*|\^)|.{41}")
 
@@ -246,12 +241,12 @@ class _UnknownUnitError(Exception):
 
 @cache
 def _parse(text: str) -> Unit:
-    text = text.replace("·", "*").replace("⋅", "*").replace("μ", "µ")
+    text = _AROUND.sub(r"\1", text.replace("·", "*").replace("⋅", "*").replace("μ", "µ"))
     name = _canonical(text)
     if name in _EXACT:
         factor, offset, si, dimension = _EXACT[name]
         return Unit(name, factor, offset, si, dimension)
-    if _NEVER_GUESSED.search(text):
+    if _NEVER_GUESSED.search(text) or not _TWO_MEANINGS.isdisjoint(_WORD.findall(text)):
         raise _UnknownUnitError(text)
     ureg = registry()
     expression = _SPELLINGS.get(text) or _in_words(_HYPHEN.sub("*", text), _WORDS)
@@ -272,8 +267,8 @@ def _parse(text: str) -> Unit:
             factor = float(ureg.Quantity(1.0, number.units).to("kelvin").magnitude) - zero
             return Unit(name, factor * float(number.magnitude), zero, "K", "temperature")
         if not number.dimensionality:
-            # pint counts an angle as a pure number; only a named angle becomes one here.
-            is_angle = any(part in _ANGLES for part in number._units)
+            # pint counts an angle as a pure number, but one whose root is the radian.
+            is_angle = dict(number.to_root_units()._units) == {"radian": 1}
             factor = float(
                 number.to("radian").magnitude if is_angle else number.to("dimensionless").magnitude
             )
@@ -316,7 +311,13 @@ def _canonical(text: str) -> str:
 
 
 def _in_words(text: str, meanings: Mapping[str, str]) -> str:
-    return _WORD.sub(lambda match: meanings.get(match[0], match[0]), text)
+    def meaning(match: re.Match[str]) -> str:
+        if moment := _MOMENT.fullmatch(match[0]):
+            product = f"{moment[1]}*{moment[2]}"
+            return product if meanings is _WRITTEN else f"({product})"
+        return meanings.get(match[0], match[0])
+
+    return _WORD.sub(meaning, text)
 
 
 def to_si(values: ArrayLike, text: str) -> Array:

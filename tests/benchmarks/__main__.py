@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.benchmarks import (
+    apply_rows,
     audit_kills,
     audit_rate,
     diagnose_equations,
@@ -42,6 +43,7 @@ BENCHES: dict[str, Callable[[Path, int], list[dict[str, object]]]] = {
     "report": report_time.run,
     "reports": report_batch.run,
     "fit": fit_rows.run,
+    "apply": apply_rows.run,
     "verify": verify_records.run,
     "registry": registry_growth.run,
     "seal": seal_time.run,

@@ -207,6 +207,7 @@ def test_what_cannot_be_applied_is_refused_and_leaves_nothing(rig: Path, tmp_pat
         (good.replace("gy [uV/V]", "gy [N]"), "o.csv", "unit-dimension"),
         (good.replace("gy [uV/V]", "hy [uV/V]"), "o.csv", "missing-column"),
         (good.replace("t [s]", "FX [N]"), "o.csv", "doubled-column"),
+        (good.replace("t [s]", "extrapolated [1]"), "o.csv", "doubled-column"),
         (good.replace("-250.0", "n/a"), "o.csv", "text-cell"),
         (good, "o.doc", "output-name"),
         (good, "good.csv", "original"),
@@ -220,15 +221,35 @@ def test_what_cannot_be_applied_is_refused_and_leaves_nothing(rig: Path, tmp_pat
         assert sorted(tmp_path.iterdir()) == before
 
 
+def test_more_rows_than_a_worksheet_has_are_refused(
+    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("toolkit.lab.records.applied._SHEET_ROWS", 3)
+    words = [
+        indications(tmp_path / "data.csv"),
+        "--out",
+        tmp_path / "o.xlsx",
+        "--home",
+        rig / "lab",
+        "--draft",
+    ]
+    code, told = commands.answer("calibration", "apply", "press-7-r1", *words)
+    assert (code, told["error"]["rule"], told["error"]["got"]) == (2, "output-name", "4 rows")
+    assert not (tmp_path / "o.xlsx").exists()
+
+
 def test_a_row_beyond_the_calibrated_range_is_a_finding(rig: Path, tmp_path: Path) -> None:
     if "approved" not in status(rig):
         assert approve(rig).code == 0
     data = tmp_path / "data.csv"
-    write(data, [f"{cell} [mV/V]" for cell in CELLS], [[9.0, 0.0, 0.0]])
+    write(data, [f"{cell} [mV/V]" for cell in CELLS], [[9.0, 0.0, 0.0], [0.1, 0.1, 0.1], [9.0, -9.0, 0.0]])
     words = [data, "--out", tmp_path / "o.csv", "--home", rig / "lab", "--on", "2026-02-05"]
     code, told = commands.answer("calibration", "apply", "press-7-r1", *words)
     assert code == 1
-    assert [finding["rule"] for finding in told["findings"]] == ["no-tare", "beyond-range"]
+    rules = [finding["rule"] for finding in told["findings"]]
+    assert rules == ["no-tare", "beyond-range", "beyond-range"]
+    # Who is handed the file alone sees which rows they are.
+    assert read_back(tmp_path / "o.csv")["extrapolated [1]"].tolist() == [1, 0, 2]
     assert math.isclose(told["loads"]["FX"]["largest"], 18e3, rel_tol=1e-3)
 
 

@@ -6,10 +6,11 @@ Beside these every answer that any test asks a command for is held to its declar
 
 from __future__ import annotations
 
+import inspect
 import json
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 import typer
@@ -193,3 +194,20 @@ def test_every_option_of_one_value_is_refused_where_it_is_given_twice() -> None:
             with pytest.raises(typer.BadParameter) as refusal:
                 command.make_context(words, [option.opts[0], "1", option.opts[0], "2"])
             assert refusal.value.message == "one value, given once", (words, option.opts)
+
+
+def test_an_empty_word_is_no_path_of_any_command() -> None:
+    """A variable of the shell that is not set made a home in the working folder."""
+    tried = 0
+    for words, command in leaves(command_tree()):
+        parameters = inspect.signature(command.callback).parameters
+        for option in command.params:
+            name = option.opts[0]
+            kind = parameters[option.name].annotation.__origin__ if option.name in parameters else None
+            if Path not in (kind, *get_args(kind)):
+                continue
+            with pytest.raises(typer.BadParameter) as refusal:
+                command.make_context(words, [name, ""] if option.param_type_name == "option" else [""] * 9)
+            assert refusal.value.message == "a path, and no empty word", (words, name)
+            tried += 1
+    assert tried > 150

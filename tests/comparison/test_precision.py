@@ -13,7 +13,7 @@ from scipy import stats
 
 from tests.comparison.comparison_factory import conicity
 from tests.coverage import repeats as drawn_repeats
-from toolkit.comparison.differences import grubbs_p
+from toolkit.comparison.differences import grubbs_p, printed_step
 from toolkit.comparison.precision import factor_spread, factors_of, repeats_of, spread, total_spread
 
 
@@ -167,6 +167,10 @@ def test_grubbs_against_the_published_critical_values(n: int, five: float, one: 
 
 def test_grubbs_needs_three_values_that_differ() -> None:
     assert grubbs_p(np.array([1.0, 2.0])) is None
+    # Two of three that print alike are no certainty that the third is off.
+    alike = np.array([100.0, 101.0, 101.0])
+    assert grubbs_p(alike, printed_step(alike)) > 0.3
+    assert grubbs_p(np.array([100.0, 101.0, 101.001]), 0.001) < 0.01
     assert grubbs_p(np.array([1.0, 1.0, 1.0])) is None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -89,3 +91,11 @@ def test_what_cannot_be_told_is_none(results: list[tuple[float, ...]], h: bool, 
 def test_a_laboratory_without_repeats_has_no_k_beside_those_that_have() -> None:
     laboratories = consistencies([(1.0, 2.0), (1.5, 3.0), (2.0,)])
     assert [laboratory.k is None for laboratory in laboratories] == [False, False, True]
+
+
+def test_of_three_results_two_that_print_alike_make_no_outlier_of_the_third() -> None:
+    """h is then at its largest, 2 / sqrt(3), beyond both limits of the standard."""
+    rounded, exact = consistencies([[100.0], [101.0], [101.0]]), consistencies([[100.0], [101.0], [101.0001]])
+    assert [laboratory.h_departure for laboratory in rounded] == [None, None, None]
+    assert rounded[0].h == pytest.approx(-2 / math.sqrt(3))
+    assert [laboratory.h_departure for laboratory in exact] == ["outlier", None, None]

@@ -51,7 +51,7 @@ class Uncertain:
     def estimate(self) -> Estimate:
         """Return value, standard uncertainty and effective degrees of freedom (GUM G.4.1)."""
         u = math.sqrt(sum(part.u * part.u for part in self.parts))
-        dof = effective_dof(_estimates(self.parts)) if u else math.inf
+        dof = float(effective_dof(_estimates(self.parts))) if u else math.inf
         return Estimate(value=self.value, u=u, unit=self.unit, dof=dof)
 
     def scaled(self, factor: float, unit: str) -> Uncertain:

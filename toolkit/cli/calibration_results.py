@@ -89,7 +89,8 @@ def apply(
     registry = place.registry()
     record = Record(result=registry.load(record_id), registry=registry, on=day(on), known_at=day(known_at))
     zero = None if tare is None else values_of(tare, "--tare")
-    payload, text, loads = apply_answer(record, data, out, tare=zero, draft=draft)
+    with output.progress("loads") as step:
+        payload, text, loads = apply_answer(record, data, out, tare=zero, draft=draft, step=step)
     output.answer(payload, text)
     return exit_code(loads.findings)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -229,9 +230,9 @@ def _typed(message: str, parameter: Any, hint: str, words: Sequence[str]) -> str
     options = list(getattr(parameter, "opts", ())) if _is_option(parameter) else [hint]
     for option in options:
         if (value := _after(option, words)) is not None:
-            return value
+            return value or "an empty word"
     match = _QUOTED.match(message)
-    return match["value"] if match else " ".join(words)
+    return match["value"] if match else shlex.join(words)
 
 
 def _after(option: str, words: Sequence[str]) -> str | None:

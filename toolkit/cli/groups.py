@@ -7,8 +7,9 @@ import inspect
 import json
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, get_args
 
 from typer import BadParameter, Typer
 from typer.core import TyperCommand, TyperGroup
@@ -30,16 +31,30 @@ class Group(TyperGroup):
 
 
 class SaidOnce(TyperCommand):
-    """A command that refuses an option of one value that is given twice: the first would be lost unseen."""
+    """A command that refuses what is lost unseen: an option of one value given twice, an empty path."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the options and arguments of a call."""
-        given: list[Any] = self.make_parser(ctx).parse_args(args=list(args))[2]
+        read: tuple[dict[str, Any], Any, list[Any]] = self.make_parser(ctx).parse_args(args=list(args))
+        values, _, given = read
+        parameters: list[Any] = self.params
+        for parameter in parameters:
+            word = values.get(parameter.name)
+            if parameter.name in self._paths and "" in (word if isinstance(word, list | tuple) else (word,)):
+                # It would be the working folder: of a variable of the shell that is not set.
+                raise BadParameter("a path, and no empty word", ctx=ctx, param=parameter)
         for option in dict.fromkeys(given):
             is_one_value = option.param_type_name == "option" and not option.multiple and not option.is_flag
             if is_one_value and given.count(option) > 1:
                 raise BadParameter("one value, given once", ctx=ctx, param=option)
         return super().parse_args(ctx, args)
+
+    @cached_property
+    def _paths(self) -> set[str]:
+        """Names of the parameters that are paths, or hold some."""
+        parameters: Any = {} if self.callback is None else inspect.signature(self.callback).parameters
+        kinds = {name: getattr(of.annotation, "__origin__", of.annotation) for name, of in parameters.items()}
+        return {name for name, kind in kinds.items() if Path in (kind, *get_args(kind))}
 
 
 class Commands(MutableMapping[str, Any]):

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from decimal import Decimal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -77,10 +78,22 @@ def deviations(values: ArrayLike) -> Array:
     return np.asarray(apart - apart.mean())
 
 
-def grubbs_p(values: Array) -> float | None:
+def printed_step(values: Array) -> float:
+    """Return the step of the last digit that values are stated to.
+
+    >>> printed_step(np.array([100.0, 101.0])), printed_step(np.array([1.0, 1.25]))
+    (1.0, 0.01)
+    """
+    exponents = (Decimal(repr(value)).normalize().as_tuple().exponent for value in values.tolist())
+    return 10.0 ** min(0, *(int(exponent) for exponent in exponents))
+
+
+def grubbs_p(values: Array, step: float = 0.0) -> float | None:
     """Return the two-sided p of the value farthest from the mean (Grubbs, Technometrics 11, 1969, 1-21).
 
-    None for fewer than three values, or values that are all the same.
+    None for fewer than three values, or values that are all the same. Values that are stated to a ``step``
+    have its variance beside their own (GUM F.2.2.1): of 100, 101 and 101 the two need not be equal, and
+    without it the third lies apart for certain.
 
     >>> round(grubbs_p(np.array([0.0, 0.1, -0.1, 0.05, 5.0])), 4) < 0.01
     True
@@ -94,6 +107,7 @@ def grubbs_p(values: Array) -> float | None:
     s = math.sqrt(float(off @ off) / (n - 1))
     if s <= 0:
         return None
+    s = math.hypot(s, step / math.sqrt(12.0))
     G = float(np.max(np.abs(off))) / s
     remainder = (n - 1) ** 2 - n * G * G
     if remainder <= 0:

@@ -24,7 +24,7 @@ from typing import Literal
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.comparison.differences import ROUNDED, deviations, grubbs_p
+from toolkit.comparison.differences import ROUNDED, deviations, grubbs_p, printed_step
 from toolkit.comparison.model import Spread
 from toolkit.comparison.precision import Consistency, Departure, consistencies, factor_spread, spread
 from toolkit.errors import ConfigError
@@ -296,7 +296,7 @@ def method_precision(results: Sequence[Results]) -> MethodPrecision:
         r=None if within is None else LIMIT * within, R=LIMIT * between.s,
         cochran_p=None if cochran is None else cochran[1],
         cochran_laboratory=None if cochran is None else cochran[0],
-        grubbs_p=grubbs_p(means),
+        grubbs_p=grubbs_p(means, printed_step(values)),
         grubbs_laboratory=results[int(np.argmax(np.abs(deviations(means))))].laboratory,
     )  # fmt: skip
 

@@ -36,7 +36,15 @@ from typing import Literal
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.comparison.differences import Series, at_load, deviations, grubbs_p, holm, series_of
+from toolkit.comparison.differences import (
+    Series,
+    at_load,
+    deviations,
+    grubbs_p,
+    holm,
+    printed_step,
+    series_of,
+)
 from toolkit.comparison.model import Entry, Factor, FactorSpread, Precision, Repeats, Spread
 
 FACTORS = ("day", "operator", "mounting", "calibration", "machine", "laboratory")
@@ -262,12 +270,16 @@ class Consistency:
 def consistencies(results: Sequence[Sequence[float]]) -> tuple[Consistency, ...]:
     """Return h and k of every laboratory from its results, their numbers equal or not.
 
+    An h departs where it would beside the variance of the results' last digit too, as for `grubbs_p`.
+
     >>> [round(laboratory.h, 3) for laboratory in consistencies([[1.0], [2.0], [6.0]])]
     [-0.756, -0.378, 1.134]
     """
     p = len(results)
     off = deviations([values[0] + float(np.mean(np.subtract(values, values[0]))) for values in results])
     scatter = math.sqrt(float(off @ off) / (p - 1)) if p > 1 else 0.0
+    step = printed_step(np.concatenate([np.asarray(values, dtype=np.float64) for values in results]))
+    sure = scatter / math.hypot(scatter, step / math.sqrt(12.0))
     dofs = [len(values) - 1 for values in results]
     squares = [float(np.sum(deviations(values) ** 2)) for values in results]
     repeated = sum(dof > 0 for dof in dofs) > 1 and sum(squares) > 0
@@ -276,7 +288,7 @@ def consistencies(results: Sequence[Sequence[float]]) -> tuple[Consistency, ...]
     for apart, dof, square in zip(off.tolist(), dofs, squares, strict=True):
         h = apart / scatter if p >= FEWEST and scatter > 0 else None
         k = math.sqrt(square / dof) / s_r if repeated and dof else None
-        h_limits = [h_limit(p, level) for level in (STRAGGLER, OUTLIER)] if h is not None else []
+        h_limits = [h_limit(p, level) / sure for level in (STRAGGLER, OUTLIER)] if h is not None else []
         k_limits = [k_limit(dof, sum(dofs), level) for level in (STRAGGLER, OUTLIER)] if k is not None else []
         laboratories.append(
             Consistency(h=h, k=k, h_departure=_departure(h, h_limits), k_departure=_departure(k, k_limits))

@@ -114,7 +114,7 @@ def departures(readings: Readings, *, share: float = 0.0) -> tuple[Departure, ..
     """
     findings = [*_force(readings, share), *_moment(readings, share)]
     if readings.signed:
-        findings += [*_slopes(readings), *_reversal(readings), *_sliding(readings)]
+        findings += [*_slopes(readings), *_reversal(readings), *sliding(readings)]
     return tuple(findings)
 
 
@@ -263,11 +263,13 @@ def _reversal(r: Readings) -> list[Departure]:
     ]
 
 
-def _sliding(r: Readings) -> list[Departure]:
+def sliding(r: Readings) -> list[Departure]:
+    """Return what is to be said where values show less friction than any dry surface; of sizes alone."""
     far = np.abs(r.SA) >= _SLIDING
-    if not far.any():
+    force = np.hypot(r.FX[far], r.FY[far])
+    if not force.any():  # beyond that angle nothing was measured
         return []
-    use = float(np.abs(r.FY[far]).sum() / r.FZ[far].sum())
+    use = float(force.sum() / r.FZ[far].sum())
     if use >= limits.SLIDING.low:
         return []
     return [

@@ -112,6 +112,7 @@ def reduce_test(
         *remarks.machine_findings(info, machine),
         *remarks.pressure_findings(info, machine),
         *remarks.speed_findings(files, machine),
+        *remarks.swept_findings(files, machine),
         *remarks.condition_findings(files),
         *remarks.selection_findings(files, selection),
         *remarks.tare_findings(files, record),

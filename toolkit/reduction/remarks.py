@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 # A cell may leave the range of the reference loads by this part of it before it is said aloud.
 _BEYOND = 0.05
+_PARTS = 5  # of a block, whose means show a move
 _SIZES = ("FZ", "V")  # axes give them a sign
 
 
@@ -76,19 +77,56 @@ def pressure_findings(info: TestInfo, machine: Machine) -> list[Finding]:
 
 
 def speed_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Finding]:
-    """Return the files whose own speed channel, averaged over a block, leaves the tolerance."""
+    """Return the files whose own speed channel, averaged over a block, leaves the tolerance.
+
+    A speed counts by its size, but a negative one contradicts a run that is declared to be forward. A sensor
+    without a sign says nothing of a reversed run.
+    """
     speeds: dict[str, list[float]] = {}
+    backwards: dict[str, float] = {}
     for file in files:
         if not file.recording.has("V"):
             continue
-        V = np.abs(file.recording["V"].si)
+        V = file.recording["V"].si
         for window in file.windows:
             mean = float(np.mean(V[window.rows]))
-            if _speed([mean], file.name, machine):
-                speeds.setdefault(file.name, []).append(mean)
-    if not speeds:
+            if _speed([abs(mean)], file.name, machine):
+                speeds.setdefault(file.name, []).append(abs(mean))
+            if mean < 0 and file.rotation == "forward":
+                backwards[file.name] = min(mean, backwards.get(file.name, 0.0))
+    findings = []
+    if speeds:
+        every = [v for values in speeds.values() for v in values]
+        findings += _speed(every, _first_names(list(speeds)), machine)
+    if backwards:
+        worst = float(from_si(min(backwards.values()), "km/h"))
+        message = (
+            f"the speed is {worst:.2f} km/h in a run that is declared forward: the drum turned the other "
+            "way, or the column has the other sign"
+        )
+        findings.append(Finding(rule="speed", where=_first_names(list(backwards)), message=message))
+    return findings
+
+
+def swept_findings(files: Sequence[OpenedFile], machine: Machine) -> list[Finding]:
+    """Return the files whose slip angle moves within a block, of which one condition is made."""
+    tolerance = machine.protocol.slip_angle_tolerance_rad
+    swept: dict[str, tuple[float, int, int]] = {}
+    for file in files:
+        for block, window in zip(file.blocks, file.windows, strict=True):
+            # Means of parts, so that noise is no move.
+            parts = np.array_split(file.channels[0, block.rows], min(_PARTS, block.n))
+            moved = float(np.ptp([part.mean() for part in parts]))
+            if moved > tolerance and moved > swept.get(file.name, (0.0, 0, 0))[0]:
+                swept[file.name] = moved, window.rows.stop - window.rows.start, block.n
+    if not swept:
         return []
-    return _speed([v for values in speeds.values() for v in values], _first_names(list(speeds)), machine)
+    moved, averaged, rows = max(swept.values())
+    message = (
+        f"the slip angle moves by {math.degrees(moved):.2f} deg within a load block: {averaged} of its "
+        f"{rows} rows are averaged to one condition"
+    )
+    return [Finding(rule="swept-block", where=_first_names(list(swept)), message=message)]
 
 
 def selection_findings(files: Sequence[OpenedFile], selection: Selection) -> list[Finding]:

@@ -12,7 +12,7 @@ from toolkit.channels import Axes, channel_of, signs
 from toolkit.errors import FitError
 from toolkit.findings import Finding
 from toolkit.reduction.limits import CONDITIONS, LARGEST_TRAIL_M, LEAST_LOAD_N, condition_finding, farthest
-from toolkit.reduction.physics import departures, of_sizes
+from toolkit.reduction.physics import departures, of_sizes, sliding
 from toolkit.reduction.selection import Selection, of_one_condition
 from toolkit.tires.evaluate import slope_estimate_at, value_at
 from toolkit.tires.fit import Curve, fit_curves, why_not
@@ -257,8 +257,10 @@ def row_findings(table: TireTable) -> tuple[Finding, ...]:
         IA=column("IA"), trail_m=LARGEST_TRAIL_M,
     )  # fmt: skip
     cause = "is a column in another unit than its header says?"
+    sideways = table.get("FY") is not None
     return unusual + tuple(
-        departure.finding("warning", cause=cause) for departure in departures(readings, share=_OUTLIERS)
+        departure.finding("warning", cause=cause)
+        for departure in (*departures(readings, share=_OUTLIERS), *(sliding(readings) if sideways else ()))
     )
 
 

@@ -103,10 +103,12 @@ def test_the_covariance_is_that_of_dense_algebra() -> None:
     place = np.array([np.sum(run[:i] == run[i]) for i in range(len(run))])
     same = run[:, None] == run
     R = np.where(same, 0.6 ** np.abs(place[:, None] - place), 0.0)
+    for root, part in zip(rows.roots(0.6), rows.parts(0.6), strict=True):
+        np.testing.assert_allclose(root @ root.T, part, rtol=1e-12)
     V = 0.8**2 * R + 3.0**2 * same + 2.0**2 * same * np.outer(relative, relative)
     A = np.linalg.pinv(design)
     J = np.array([1.5, 1.0])
-    variance, gradient = rows.variance(scatter, J)
+    (variance, _), (gradient, _) = rows.variance(scatter, np.array([J, 2 * J]))
     assert variance == pytest.approx(J @ A @ V @ A.T @ J, rel=1e-9)
     assert gradient[1] == pytest.approx(J @ A @ same @ A.T @ J, rel=1e-9)
     step = 1e-6

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.registry import Registry
 from toolkit.calibration.registry.stored import stored_loads
-from toolkit.calibration.uncertainty.budget import Prediction, calibration_budget, predict
+from toolkit.calibration.uncertainty.budget import Prediction, calibration_budget, expanded_of_rows, predict
 from toolkit.calibration.uncertainty.model import Budget
 
 Values = Sequence[float] | NDArray[np.float64]
@@ -167,3 +167,31 @@ def test_half_the_stated_uncertainty_is_half_of_the_fit_s_part(tmp_path: Path) -
     # By the plain formula of a straight line: u^2 (1/n + (x - mean)^2 / Sxx).
     wanted = 0.4 * math.sqrt(1 / 8 + (1.0 - x.mean()) ** 2 / np.sum((x - x.mean()) ** 2))
     assert one.at(1.0).budget.component("fit").u == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("method", "tail"),
+    [
+        ("ols", 'model = "polynomial"\ndegree = 5\nzero = "tared"\n'),
+        ("wls", ""),
+        ("gls", '[reference]\nshared_group = { column = "run", error = "proportional" }\n'),
+        ("odr", "[cells.S]\nu = 1e-4\nresolution = 1e-4\n"),
+    ],
+)
+def test_rows_of_a_file_have_the_budgets_of_their_points(tmp_path: Path, method: str, tail: str) -> None:
+    """Any number of rows at once, beyond what is computed together, with a row that is no number."""
+    rng = np.random.default_rng(8)
+    y = np.tile(np.linspace(0.0, 800.0, 9), 3)
+    x = (y / 400 + np.repeat(rng.normal(0, 1e-3, 3), 9) + rng.normal(0, 1e-4, 27) * (1 + y / 100)).round(6)
+    tail += '[reference.uncertainty]\nF = { U = 0.8, k = 2, unit = "N" }\n'
+    case = Case(
+        tmp_path, x, y, method=method, u=None if method == "ols" else np.full(27, 0.4), tail=tail,
+        run=np.repeat([1, 2, 3], 9).tolist(),
+    )  # fmt: skip
+    points = np.append(rng.uniform(-0.5, 2.5, 5000), [0.0, np.nan])
+    told: list[int] = []
+    U = expanded_of_rows(case.record, case.loads, None, "F", points[:, None], step=told.append)
+    assert np.isnan(U[-1])
+    assert told == [4096, 5002]
+    for at in (0, 1, 4095, 4096, 5000):
+        assert U[at] == pytest.approx(case.at(points[at]).budget.U, rel=1e-12)

@@ -21,8 +21,9 @@ does (Particle Data Group, Review of Particle Physics, section 5.2.2).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,13 +88,28 @@ class Rows:
 
     def parts(self, correlation: float) -> Array:
         """Return A V_k A^T of a unit of within^2, zero^2 and gain^2 (3, terms, terms)."""
+        noisy, group, zero, gain = self._by_run()
+        return np.stack([_within(noisy, group, correlation), zero @ zero.T, gain @ gain.T])
+
+    def roots(self, correlation: float) -> tuple[Array, Array, Array]:
+        """Return B_k (terms, at most terms) with B_k B_k^T = A V_k A^T, as `parts` has them.
+
+        J B_k keeps the digits that J (A V_k A^T) J^T loses where terms nearly cancel in A.
+        """
+        noisy, group, zero, gain = self._by_run()
+        within = _root_within(noisy, group, correlation)
+        first, second, third = (np.linalg.qr(part.T)[1].T for part in (within, zero, gain))
+        return first, second, third
+
+    def _by_run(self) -> tuple[Array, NDArray[np.int64], Array, Array]:
+        """Return A s and the run of each row, the rows of a run together; the sums of A and A l by run."""
         order = np.argsort(self.group, kind="stable")
         A, group, relative = self.operator[:, order], self.group[order], self.relative[order]
         runs = int(group[-1]) + 1
         zero = np.stack([np.bincount(group, weights=row, minlength=runs) for row in A])
         gain = np.stack([np.bincount(group, weights=row * relative, minlength=runs) for row in A])
         noisy = A if self.noise is None else A * self.noise[order]
-        return np.stack([_within(noisy, group, correlation), zero @ zero.T, gain @ gain.T])
+        return noisy, group, np.asarray(zero, dtype=np.float64), np.asarray(gain, dtype=np.float64)
 
     def covariance(self, scatter: RunScatter) -> Array:
         """Return the covariance of the coefficients (terms, terms) that a normal interval may be built on.
@@ -152,23 +168,22 @@ class Rows:
         effects = solved[self.group]
         return np.asarray(effects[:, 0] + effects[:, 1] * self.relative)
 
-    def variance(self, scatter: RunScatter, J: Array) -> tuple[float, Array]:
-        """Return J C J^T, unexpanded, of one vector J (terms,), and its gradient (4,).
+    def variance(self, scatter: RunScatter, J: Array) -> tuple[Array, Array]:
+        """Return J C J^T, unexpanded, of vectors J (points, terms), and their gradients (points, 4).
 
         The gradient is by within^2, zero^2, gain^2 and the correlation.
         """
-        alone = replace(self, operator=(J @ self.operator)[None, :], shared=None, rounded=None)
-        share = alone.parts(scatter.correlation)[:, 0, 0]
         phi = scatter.correlation
+        share = np.column_stack([_squares(J @ root) for root in self.roots(phi)])
         near = [max(phi - _STEP, 0.0), phi + _STEP]
-        moved = [float(alone.parts(value)[0, 0, 0]) for value in near]
+        moved = [_squares(J @ self.roots(value)[0]) for value in near]
         more = self.shows_more(scatter)
         variances = np.where(more, scatter.variances, self.stated)
         turned = variances[0] * (moved[1] - moved[0]) / (near[1] - near[0])
-        shared = sum(float(J @ part @ J) for part in (self.shared, self.rounded) if part is not None)
+        shared = sum(quadratic(J, part) for part in (self.shared, self.rounded) if part is not None)
         # What is stated is known: it moves with no estimate.
         estimated = np.where(more, share, 0.0)
-        return float(variances @ share) + shared, np.append(estimated, turned)
+        return share @ variances + shared, np.column_stack([estimated, turned])
 
 
 def rows_of(design: Array, load: Array, group: NDArray[np.int64], operator: Array | None = None) -> Rows:
@@ -191,7 +206,24 @@ def _within(A: Array, group: NDArray[np.int64], correlation: float) -> Array:
     product = A @ A.T
     if correlation <= 0:
         return np.asarray(product)
-    # R = L + L^T - 1 with L the sum over all rows before; its geometric series doubles at every step.
+    # R = L + L^T - 1 with L the sum over all rows before.
+    half = _filtered(A, group, correlation) @ A.T
+    return np.asarray(half + half.T - product)
+
+
+def _root_within(A: Array, group: NDArray[np.int64], correlation: float) -> Array:
+    """Return B (terms, rows) with B B^T = A R A^T, R as in `_within`."""
+    if correlation <= 0:
+        return A
+    # Cholesky's factor of R, from each run's last row on: the sums before, each by what is new in its row.
+    last = np.append(group[1:] != group[:-1], True)
+    new = math.sqrt(max(1 - correlation**2, 0.0))
+    return np.asarray(_filtered(A, group, correlation) * np.where(last, 1.0, new))
+
+
+def _filtered(A: Array, group: NDArray[np.int64], correlation: float) -> Array:
+    """Return the sums over each row and those before it in its run, each weighed by correlation^distance."""
+    # The geometric series doubles at every step.
     filtered, lag, weight = A.copy(), 1, correlation
     while lag < A.shape[1] and weight > _NEGLIGIBLE:
         neighbours = group[lag:] == group[:-lag]
@@ -199,8 +231,16 @@ def _within(A: Array, group: NDArray[np.int64], correlation: float) -> Array:
         filtered = filtered.copy()
         filtered[:, lag:] += weight * before
         lag, weight = 2 * lag, weight * weight
-    half = filtered @ A.T
-    return np.asarray(half + half.T - product)
+    return filtered
+
+
+def quadratic(J: Array, form: Array) -> Array:
+    """Return J C J^T of every row of J (points, terms)."""
+    return np.asarray(np.einsum("ij,ij->i", J @ form, J))
+
+
+def _squares(rows: Array) -> Array:
+    return np.asarray(np.einsum("ij,ij->i", rows, rows))
 
 
 def chi2_limit(dof: int) -> float:

@@ -13,7 +13,7 @@ ISO 376:2011 annex C and EURAMET cg-4; their forms are those of a deflection, ou
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,12 +24,13 @@ from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
-from toolkit.calibration.uncertainty.model import Budget, Temperature
+from toolkit.calibration.uncertainty.model import Budget, Contribution, Temperature
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
 from toolkit.errors import SessionError
-from toolkit.estimate import coverage_factor, effective_dof
+from toolkit.estimate import coverage_factors, effective_dof
 
 PROBABILITY = 0.95
+_AT_A_TIME = 1 << 12  # rows whose budgets are made together: some megabytes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,13 +119,19 @@ def predict(
     )
 
 
-def budgets_of_rows(
-    record: CalibrationRecord, loads: Table, check: Table | None, load: str, indications: Array
-) -> tuple[Budget | None, ...]:
-    """Return the budget of a load at every row of indications (rows, indications) [the record's units].
+def expanded_of_rows(
+    record: CalibrationRecord,
+    loads: Table,
+    check: Table | None,
+    load: str,
+    indications: Array,
+    *,
+    step: Callable[[int], None] | None = None,
+) -> Array:
+    """Return U of a load at every row of indications (rows, indications) [the record's units].
 
-    Each is that of `predict` at the row; the session's scatter is taken once for all of them, and a budget
-    once for all rows that are the same. None where a row is not finite.
+    Each is that of `predict` at the row, not a number where the row has none. The session's scatter is taken
+    once; rows go some thousand at a time, and ``step`` is told how many are done.
 
     Raises
     ------
@@ -134,19 +141,20 @@ def budgets_of_rows(
         the record has no such load
     """
     fitted = _fitted(record, load)
-    terms = term_matrix(fitted.terms, dict(zip(record.indications, indications.T, strict=True)))
-    values = terms @ np.asarray(fitted.coefficients)
     scatter = scatter_of(record, loads, fitted)
-    budgets: dict[bytes, Budget | None] = {}
-    keys = [point.tobytes() for point in indications]
-    for key, value, point in zip(keys, values.tolist(), indications, strict=True):
-        if key not in budgets:
-            budgets[key] = (
-                _budget(record, loads, check, fitted, value, point, None, PROBABILITY, scatter)
-                if math.isfinite(value)
-                else None
-            )
-    return tuple(budgets[key] for key in keys)
+    U = np.full(len(indications), np.nan)
+    for start in range(0, len(indications), _AT_A_TIME):
+        points = indications[start : start + _AT_A_TIME]
+        columns = dict(zip(record.indications, points.T, strict=True))
+        values = term_matrix(fitted.terms, columns) @ np.asarray(fitted.coefficients)
+        finite = np.isfinite(values)
+        if finite.any():
+            U[start : start + _AT_A_TIME][finite] = _Budgets.at(
+                record, loads, check, fitted, values[finite], points[finite], None, PROBABILITY, scatter
+            ).U
+        if step is not None:
+            step(start + len(points))
+    return U
 
 
 def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: float) -> Array:
@@ -163,13 +171,48 @@ def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: 
     return point
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Budgets:
+    """Budgets of one load at many points: ``u``, ``dof``, ``k`` and ``U`` (points,)."""
+
+    contributions: tuple[Contribution, ...]
+    scatter_dof: Array
+    u: Array
+    dof: Array
+    k: Array
+    U: Array
+
+    @classmethod
+    def at(
+        cls,
+        record: CalibrationRecord,
+        loads: Table,
+        check: Table | None,
+        load: LoadFit,
+        values: Array,
+        points: Array,
+        temperature: Temperature | None,
+        probability: float,
+        scatter: Scatter,
+    ) -> _Budgets:
+        """Return the budgets: JCGM 100 eq. 10, G.2b and G.6.4."""
+        parts, scatter_dof = components_of(
+            record, statements_of(record), loads, check, load, values=values, points=points,
+            temperature=temperature, scatter=scatter,
+        )  # fmt: skip
+        joint = np.sqrt(np.asarray(sum(part.u**2 for part in parts if part.joint)))
+        apart = [(part.u, part.dof) for part in parts if not part.joint]
+        u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
+        return cls(contributions=parts, scatter_dof=scatter_dof, u=u, dof=dof, k=k, U=U)
+
+
 def combine(
-    contributions: Sequence[tuple[float, float]], probability: float
-) -> tuple[float, float, float, float]:
-    """Return (u, dof, k, U) of independent (u_i, dof_i): JCGM 100 eq. 10, G.2b and G.6.4."""
-    u = math.sqrt(math.fsum(u * u for u, _ in contributions))
-    dof = effective_dof(list(contributions)) if u else math.inf
-    k = coverage_factor(dof, probability)
+    contributions: Sequence[tuple[Array | float, Array | float]], probability: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return (u, dof, k, U) of independent (u_i, dof_i) at many points: JCGM 100 eq. 10, G.2b, G.6.4."""
+    u = np.sqrt(np.asarray(sum(u * u for u, _ in contributions)))
+    dof = effective_dof(contributions)
+    k = coverage_factors(dof, probability)
     return u, dof, k, k * u
 
 
@@ -184,17 +227,17 @@ def _budget(
     probability: float,
     scatter: Scatter | None = None,
 ) -> Budget:
-    parts, scatter_dof = components_of(
-        record, statements_of(record), loads, check, load, value=value, point=point, temperature=temperature,
-        scatter=scatter,
+    budgets = _Budgets.at(
+        record, loads, check, load, np.array([value]), point[None], temperature, probability,
+        scatter or scatter_of(record, loads, load),
     )  # fmt: skip
-    joint = math.sqrt(math.fsum(part.u**2 for part in parts if part.joint))
-    apart = [(part.u, part.dof) for part in parts if not part.joint]
-    u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
+    u, dof, k, U, scatter_dof = (
+        values.item() for values in (budgets.u, budgets.dof, budgets.k, budgets.U, budgets.scatter_dof)
+    )
     return Budget(
         record=record.id, load=load.load, unit=load.unit, at=value, indications=tuple(point.tolist()),
-        components=parts, u=u, dof=dof, k=k, U=U, probability=probability,
-        scatter_dof=scatter_dof,
+        components=tuple(part.at(0) for part in budgets.contributions), u=u, dof=dof, k=k, U=U,
+        probability=probability, scatter_dof=scatter_dof,
     )  # fmt: skip
 
 

@@ -29,7 +29,6 @@ the record alone; they stand in the budget. Resolution averages out over a block
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,17 +69,18 @@ def indication_errors(record: CalibrationRecord, statements: Statements) -> tupl
     )
 
 
-def sensitivities(record: CalibrationRecord, load: LoadFit, point: Sequence[float]) -> Array:
-    """Return d load / d indication (indications,) at a point, by central differences."""
-    sizes = [(abs(cell.minimum or 0.0), abs(cell.maximum or 0.0)) for cell in record.cells]
-    steps = _STEP * np.array([max(*ends, abs(x)) or 1.0 for ends, x in zip(sizes, point, strict=True)])
-    at = np.asarray(point, dtype=np.float64)[:, None]
-    moved = np.hstack([at + np.diag(steps), at - np.diag(steps)])
-    values = term_matrix(load.terms, dict(zip(record.indications, moved, strict=True))) @ np.asarray(
-        load.coefficients
-    )
-    slopes: Array = (values[: len(steps)] - values[len(steps) :]) / (2 * steps)
-    return slopes
+def sensitivities(record: CalibrationRecord, load: LoadFit, points: Array) -> Array:
+    """Return d load / d indication (points, indications), by central differences."""
+    sizes = np.array([max(abs(cell.minimum or 0.0), abs(cell.maximum or 0.0)) for cell in record.cells])
+    reach = np.maximum(sizes, np.abs(points)).T  # (indications, points), as all below
+    steps = _STEP * np.where(reach == 0, 1.0, reach)
+    moves = np.eye(len(steps))[:, :, None] * steps[:, None, :]
+    at = points.T[:, None, :]
+    moved = np.concatenate([at + moves, at - moves], axis=1)
+    columns = dict(zip(record.indications, moved.reshape(len(steps), -1), strict=True))
+    values = (term_matrix(load.terms, columns) @ np.asarray(load.coefficients)).reshape(2, *steps.shape)
+    slopes: Array = (values[0] - values[1]) / (2 * steps)
+    return slopes.T
 
 
 def zero_drift(record: CalibrationRecord) -> tuple[float, ...] | str:
@@ -131,7 +131,7 @@ def creep(record: CalibrationRecord, load: LoadFit) -> float | str:
         else:
             if slope is None:
                 slope = dict(
-                    zip(record.indications, sensitivities(record, load, _middle(record)), strict=True)
+                    zip(record.indications, sensitivities(record, load, _middle(record))[0], strict=True)
                 )
             value = sum(float(slope[name]) * reading for name, reading in entry.values)
         key = f"{entry.load} {' '.join(name for name, _ in entry.values)}"
@@ -142,8 +142,9 @@ def creep(record: CalibrationRecord, load: LoadFit) -> float | str:
     return max(moved) / load.largest if moved else "no two creep readings of this load are stated"
 
 
-def _middle(record: CalibrationRecord) -> tuple[float, ...]:
-    return tuple(((cell.minimum or 0.0) + (cell.maximum or 0.0)) / 2 for cell in record.cells)
+def _middle(record: CalibrationRecord) -> Array:
+    """Return the middle of the calibrated indications, as one point (1, indications)."""
+    return np.array([[((cell.minimum or 0.0) + (cell.maximum or 0.0)) / 2 for cell in record.cells]])
 
 
 def record_covariance(record: CalibrationRecord) -> dict[str, Array]:
@@ -181,7 +182,7 @@ def offset_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -
     tared = left_at_zero(record, load) / math.sqrt(3.0)
     if not any(stated) and isinstance(drift, str):
         return tared
-    slope = sensitivities(record, load, _middle(record))
+    slope = sensitivities(record, load, _middle(record))[0]
     moved = 0.0 if isinstance(drift, str) else float(slope @ np.asarray(drift)) / math.sqrt(3.0)
     return math.hypot(tared, float(np.linalg.norm(slope * np.asarray(stated))), moved)
 

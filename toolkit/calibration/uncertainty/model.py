@@ -7,8 +7,11 @@ has been applied, so that the shares u_i^2 / u^2 add up to one.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
+
+from toolkit.arrays import Array
 
 Evaluation = Literal["A", "B"]
 Distribution = Literal["normal", "student", "rectangular"]
@@ -41,6 +44,32 @@ class Component:
     source: str
     stated: bool = True
     joint: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contribution:
+    """A component at many points, each with the ``u`` and ``dof`` of its own: (points,), or () of all alike.
+
+    ``describe`` gives the description at a point; the rest is as in `Component`.
+    """
+
+    name: str
+    describe: Callable[[int], str]
+    type: Evaluation
+    distribution: Distribution
+    u: Array
+    dof: Array
+    source: str
+    stated: bool
+    joint: bool
+
+    def at(self, point: int) -> Component:
+        """Return the component at one of the points."""
+        u, dof = (float(values.flat[point if values.size > 1 else 0]) for values in (self.u, self.dof))
+        return Component(
+            name=self.name, description=self.describe(point), type=self.type, distribution=self.distribution,
+            u=u, dof=dof, source=self.source, stated=self.stated, joint=self.joint,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,7 +21,7 @@ from toolkit.calibration.fit.row_noise import RowNoise, noise_of, shown_rows, we
 from toolkit.calibration.fit.run_scatter import estimate, spread
 from toolkit.calibration.fit.session_rows import SessionRows, groups_of
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
-from toolkit.calibration.records.scatter import SHOWN, UNTOLD, UNTOLD_DOF, Rows, RunScatter
+from toolkit.calibration.records.scatter import SHOWN, UNTOLD, UNTOLD_DOF, Rows, RunScatter, quadratic
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
 from toolkit.calibration.terms import term_matrix
@@ -54,14 +54,17 @@ class Scatter:
             return np.ones(len(next(iter(columns.values()))))
         return self.profile.at(columns)
 
-    def dof(self, gradient: Array, variance: float) -> float:
-        """Return Satterthwaite's degrees of freedom of a variance, 2 u^4 / Var(u^2), one at least.
+    def dof(self, gradient: Array, variance: Array) -> Array:
+        """Return Satterthwaite's degrees of freedom of variances (points,), 2 u^4 / Var(u^2), one at least.
 
-        ``gradient`` (4,) is d u^2 by within^2, zero^2, gain^2 and the correlation. Two runs differ in one
-        number; less than that the formula gives where it takes a variance for about none.
+        ``gradient`` (points, 4) is d u^2 by within^2, zero^2, gain^2 and the correlation. Two runs differ
+        in one number; less than that the formula gives where it takes a variance for about none.
         """
-        uncertain = float(gradient @ self.spread @ gradient)
-        return max(2 * variance**2 / uncertain, 1.0) if uncertain > 0 else float("inf")
+        uncertain = quadratic(gradient, self.spread)
+        dof = np.divide(
+            2 * variance**2, uncertain, out=np.full(uncertain.shape, np.inf), where=~(uncertain <= 0)
+        )
+        return np.asarray(np.maximum(dof, 1.0))
 
 
 def scatter_of(record: CalibrationRecord, loads: Table, fitted: LoadFit) -> Scatter:

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.arrays import Array
 from toolkit.calibration.records.use import CalibrationUse, UsedRecord
 from toolkit.errors import ConfigError, OutputError
 from toolkit.findings import Finding, FindingEntry
@@ -57,6 +56,12 @@ class ApplyAnswer(TypedDict):
 
 Table = Mapping[str, "NDArray[Any]"]
 
+EXTRAPOLATED = "extrapolated [1]"
+"""Column of a result: how many indications of the row lie beyond their calibrated range."""
+
+_SHEET_ROWS = 2**20 - 1  # below the head: a worksheet has 2^20 rows
+_AT_A_TIME = 1 << 14  # rows that are made text together
+
 
 def read_indications(path: Path, record: Record) -> tuple[tuple[Series, ...], list[Finding]]:
     """Return the columns of a file that holds the indications of a record, each with its unit; and findings.
@@ -92,19 +97,24 @@ def _parquet(data: bytes, path: Path) -> Vectors:
     return Vectors(where=str(path), vectors=[vector for vector in vectors if vector.values.dtype.kind != "O"])
 
 
-def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, Array]:
+def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, NDArray[Any]]:
     """Return the columns of the output by header: those of the file, then each load and its U.
+
+    The last tells how many indications of a row lie beyond what they were calibrated over.
 
     Raises
     ------
     ConfigError
         ``doubled-column``: the file has a column of a load already
     """
-    columns = {f"{column.symbol} [{column.unit}]": column.values for column in series}
-    clash = {column.symbol for column in series} & set(loads.value)
+    columns: dict[str, NDArray[Any]] = {
+        f"{column.symbol} [{column.unit}]": column.values for column in series
+    }
+    own = {*loads.value, *(f"U({name})" for name in loads.value), EXTRAPOLATED.partition(" ")[0]}
+    clash = {column.symbol for column in series} & own
     if clash:
         raise ConfigError(
-            "the file has columns of loads already", where=", ".join(sorted(clash)),
+            "the file has columns of results already", where=", ".join(sorted(clash)),
             got="a column in the file", expected="indications, and other columns of other names",
             next_step="take it out of a copy of the file, or rename it there", rule="doubled-column",
         )  # fmt: skip
@@ -112,6 +122,7 @@ def applied_columns(series: Sequence[Series], loads: Loads) -> dict[str, Array]:
         unit = loads.units[name]
         columns[f"{name} [{unit}]"] = values
         columns[f"U({name}) [{unit}]"] = loads.U[name]
+    columns[EXTRAPOLATED] = loads.extrapolated
     return columns
 
 
@@ -126,13 +137,21 @@ def write_applied(path: Path, columns: Table, use: CalibrationUse) -> None:
     ConfigError
         ``missing-extra``
     """
-    from toolkit.publication import write_result
+    from toolkit.publication import result_file
 
     write = check_output(path)
-    write_result(path, write(columns, use))
+    rows = len(next(iter(columns.values())))
+    if path.suffix.lower() == ".xlsx" and rows > _SHEET_ROWS:
+        raise OutputError(
+            "a worksheet cannot hold the rows", where=path, got=f"{rows} rows",
+            expected=f"at most {_SHEET_ROWS} rows below the head", rule="output-name",
+            next_step="name a file that ends in .csv or .parquet with --out; nothing was written",
+        )  # fmt: skip
+    with result_file(path) as staged:
+        write(columns, use, staged)
 
 
-def check_output(path: Path) -> Callable[[Table, CalibrationUse], bytes]:
+def check_output(path: Path) -> Callable[[Table, CalibrationUse, Path], None]:
     """Return the writer of an ending, before anything is computed; errors as `write_applied`."""
     write = WRITERS.get(path.suffix.lower())
     if write is None:
@@ -154,47 +173,55 @@ def mark_line(use: CalibrationUse) -> str:
     return "; ".join(filter(None, (GENERATOR, OWN_OUTPUT, f"{use.id} {use.sha256}", use.mark)))
 
 
-def _with_record(columns: Table, use: CalibrationUse) -> dict[str, NDArray[Any]]:
+def _texts(use: CalibrationUse) -> dict[str, str]:
+    """Return what every row says of the record."""
+    return {"calibration": use.id, "calibration_sha256": use.sha256, "mark": use.mark or ""}
+
+
+def _blocks(columns: Table) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield the rows some thousand at a time: as text they take many times their room."""
     rows = len(next(iter(columns.values())))
-    texts = {"calibration": use.id, "calibration_sha256": use.sha256, "mark": use.mark or ""}
-    return {**columns, **{name: np.full(rows, text) for name, text in texts.items()}}
+    for start in range(0, rows, _AT_A_TIME):
+        yield {name: values[start : start + _AT_A_TIME] for name, values in columns.items()}
 
 
-def _csv(columns: Table, use: CalibrationUse) -> bytes:
+def _csv(columns: Table, use: CalibrationUse, path: Path) -> None:
     import pandas as pd
 
-    frame = pd.DataFrame(_with_record(columns, use))
-    return str(frame.to_csv(index=False, lineterminator="\n")).encode()
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        for at, block in enumerate(_blocks(columns)):
+            frame = pd.DataFrame({**block, **_texts(use)})
+            frame.to_csv(stream, index=False, header=at == 0, lineterminator="\n")
 
 
-def _xlsx(columns: Table, use: CalibrationUse) -> bytes:
+def _xlsx(columns: Table, use: CalibrationUse, path: Path) -> None:
     import openpyxl
 
-    book = openpyxl.Workbook()
-    sheet: Any = book.active
-    sheet.title = "loads"
-    table = _with_record(columns, use)
-    sheet.append(list(table))
-    for row in zip(*(values.tolist() for values in table.values()), strict=True):
-        sheet.append([None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row])
+    book = openpyxl.Workbook(write_only=True)
+    sheet: Any = book.create_sheet("loads")
     sheet.freeze_panes = "A2"
+    texts = _texts(use)
+    sheet.append([*columns, *texts])
+    for block in _blocks(columns):
+        for row in zip(*(values.tolist() for values in block.values()), strict=True):
+            cells = [None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row]
+            sheet.append([*cells, *texts.values()])
     book.properties.creator, book.properties.title = GENERATOR, use.mark or f"loads by {use.id}"
     book.properties.keywords = f"{OWN_OUTPUT}; {mark_line(use)}"
     book.properties.created = book.properties.modified = STAMP
-    stream = io.BytesIO()
+    stream = io.BytesIO()  # packed; on a full disk an archive that is open says so once more as it goes
     book.save(stream)
-    return stream.getvalue()
+    path.write_bytes(stream.getvalue())
 
 
-def _parquet_bytes(columns: Table, use: CalibrationUse) -> bytes:
+def _parquet_table(columns: Table, use: CalibrationUse, path: Path) -> None:
     arrow: Any = needed("pyarrow", extra="parquet", to="write a Parquet table", where="--out")
     parquet: Any = needed("pyarrow.parquet", extra="parquet", to="write a Parquet table", where="--out")
-    table = arrow.table({name: values.tolist() for name, values in _with_record(columns, use).items()})
-    stream = io.BytesIO()
-    parquet.write_table(
-        table.replace_schema_metadata({"generator": GENERATOR, "marks": mark_line(use)}), stream
-    )
-    return stream.getvalue()
+    rows = len(next(iter(columns.values())))
+    texts = {name: arrow.repeat(text, rows) for name, text in _texts(use).items()}
+    table = arrow.table({**columns, **texts})
+    marks = {"generator": GENERATOR, "marks": mark_line(use)}
+    parquet.write_table(table.replace_schema_metadata(marks), path)
 
 
 def _channels(columns: Table) -> list[Written]:
@@ -207,29 +234,45 @@ def _channels(columns: Table) -> list[Written]:
     return written
 
 
-WRITERS: dict[str, Callable[[Table, CalibrationUse], bytes]] = {
+def _tdms(columns: Table, use: CalibrationUse, path: Path) -> None:
+    path.write_bytes(tdms_bytes(_channels(columns), mark_line(use)))
+
+
+def _mdf(columns: Table, use: CalibrationUse, path: Path) -> None:
+    path.write_bytes(mdf_bytes(_channels(columns), mark_line(use)))
+
+
+WRITERS: dict[str, Callable[[Table, CalibrationUse, Path], None]] = {
     ".csv": _csv,
     ".xlsx": _xlsx,
-    ".parquet": _parquet_bytes,
-    ".tdms": lambda columns, use: tdms_bytes(_channels(columns), mark_line(use)),
-    ".mf4": lambda columns, use: mdf_bytes(_channels(columns), mark_line(use)),
+    ".parquet": _parquet_table,
+    ".tdms": _tdms,
+    ".mf4": _mdf,
 }
 """Ending of an output -> its writer."""
 
 
 def apply_answer(
-    record: Record, source: Path, out: Path, *, tare: Mapping[str, float] | None, draft: bool
+    record: Record,
+    source: Path,
+    out: Path,
+    *,
+    tare: Mapping[str, float] | None,
+    draft: bool,
+    step: Callable[[str], None] = lambda _text: None,
 ) -> tuple[ApplyAnswer, str, Loads]:
     """Compute a file's loads by a record and write them; return both forms of the answer, and the loads."""
     from toolkit.lab.answers import finding_lines, one_line
 
     check_output(out)
+    step("reading")
     series, of_file = read_indications(source, record)
     by_name = {column.symbol: column for column in series}
     units = {name: by_name[name].unit for name in record.indications}
     values = {name: by_name[name].values for name in record.indications}  # noqa: PD011  a Series of ours
-    loads = record.apply(values, units=units, tare=tare, draft=draft)
+    loads = record.apply(values, units=units, tare=tare, draft=draft, step=step)
     loads = dataclasses.replace(loads, findings=(*loads.findings, *of_file))
+    step(f"writing {out.name}")
     write_applied(out, applied_columns(series, loads), loads.use)
     ranges = {name: _range(loads, name) for name in loads.value}
     rows = len(series[0].values)

@@ -14,8 +14,10 @@ from toolkit.lab.faces import Face, Facts
 from toolkit.units import printed
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from toolkit.arrays import Array
     from toolkit.calibration.records.record import CalibrationRecord
@@ -71,6 +73,7 @@ class Record(Face):
         tare: Mapping[str, Any] | None = None,
         draft: bool = False,
         uncertainty: bool = True,
+        step: Callable[[str], None] = lambda _text: None,
     ) -> Loads:
         """Return the loads of every row of a DataFrame, each with its expanded uncertainty.
 
@@ -81,7 +84,8 @@ class Record(Face):
         units : unit by column name
         tare : the unloaded indications, by name, in the units of the columns or as quantities; None without
         draft : allow a record that may not make a number on this day (`result` is then marked)
-        uncertainty : the budget of every row; about a millisecond for a row and a load
+        uncertainty : the budget of every row, some microseconds for a row and a load
+        step : is told how far it is, some thousand rows at a time
 
         Returns
         -------
@@ -127,7 +131,8 @@ class Record(Face):
         return Loads(
             value=loads,
             units={fit.load: unit(fit.unit).si for fit in record.loads},
-            U=self._expanded(points) if uncertainty else {},
+            U=self._expanded(points, step) if uncertainty else {},
+            extrapolated=np.sum(self._outside(points), axis=0),
             index=getattr(data, "index", None),
             use=use,
             findings=(*self._untared(zero is not None), *self._beyond(points)),
@@ -186,24 +191,24 @@ class Record(Face):
             figures |= open_figures(report, title=self.id)
         return figures
 
-    def _expanded(self, points: Array) -> dict[str, Array]:
+    def _expanded(self, points: Array, step: Callable[[str], None]) -> dict[str, Array]:
         import numpy as np
 
-        from toolkit.calibration.uncertainty.budget import budgets_of_rows
+        from toolkit.calibration.uncertainty.budget import expanded_of_rows
         from toolkit.units import si_scale
 
         record = self.result
         if not record.verified:
             return {fit.load: np.full(len(points), np.nan) for fit in record.loads}
         rows, check = self._stored()
-        return {
-            fit.load: si_scale(fit.unit)
-            * np.array([
-                np.nan if budget is None else budget.U
-                for budget in budgets_of_rows(record, rows, check, fit.load, points)
-            ])
-            for fit in record.loads
-        }  # fmt: skip
+
+        def expanded(load: str) -> Array:
+            def done(count: int) -> None:
+                step(f"U({load}), row {count} of {len(points)}")
+
+            return expanded_of_rows(record, rows, check, load, points, step=done)
+
+        return {fit.load: si_scale(fit.unit) * expanded(fit.load) for fit in record.loads}
 
     def _stored(self) -> tuple[Table, Table | None]:
         """Return the reference and check loads that the record was fitted to."""
@@ -243,26 +248,38 @@ class Record(Face):
         from toolkit.findings import Finding
 
         findings = []
-        for cell, values in zip(self.result.cells, points.T, strict=True):
-            if cell.minimum is None or cell.maximum is None:
-                continue
-            if count := int(((values < cell.minimum) | (values > cell.maximum)).sum()):
-                text = f"{count} of {len(values)} rows lie beyond the calibrated indications: extrapolated"
+        for cell, outside in zip(self.result.cells, self._outside(points), strict=True):
+            if count := int(outside.sum()):
+                text = f"{count} of {len(points)} rows lie beyond the calibrated indications: extrapolated"
                 findings.append(Finding(rule="beyond-range", where=f"{self.id}, {cell.name}", message=text))
         return tuple(findings)
+
+    def _outside(self, points: Array) -> NDArray[np.bool_]:
+        """Tell which points (indications, points) lie beyond the calibrated range of each indication."""
+        import numpy as np
+
+        low, high = (
+            np.array([[unlimited if end is None else end] for end in ends])
+            for unlimited, ends in (
+                (-np.inf, [cell.minimum for cell in self.result.cells]),
+                (np.inf, [cell.maximum for cell in self.result.cells]),
+            )
+        )
+        return np.asarray((low > points.T) | (high < points.T))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class Loads(Face):
     """Loads of every row of some data: ``value`` and expanded uncertainty ``U`` (rows,) by load, in SI.
 
-    ``units`` of each load; ``U`` is empty where no uncertainty was asked for; ``use`` says how the
-    record stood.
+    ``units`` of each load; ``U`` is empty where no uncertainty was asked for; ``extrapolated`` (rows,) counts
+    the indications of each row that lie beyond their calibrated range; ``use`` says how the record stood.
     """
 
     value: Mapping[str, Array]
     units: Mapping[str, str]
     U: Mapping[str, Array]
+    extrapolated: NDArray[np.int64]
     use: CalibrationUse
     findings: tuple[Finding, ...]
     index: Any = None

@@ -167,8 +167,8 @@ def calibration(report: ReportedTest, style: Style) -> Rows:
     "the acquisition program's own FY and MZ against the report's, one row a file",
     (
         *columns_of("file|recording"),
-        number_column("FY_difference", "largest |FY of the file - FY|", "force", ".2f"),
-        number_column("MZ_difference", "largest |MZ of the file - MZ|", "moment", ".3f"),
+        number_column("FY_difference", "largest |FY of the file - FY|", "force", ".1f"),
+        number_column("MZ_difference", "largest |MZ of the file - MZ|", "moment", ".2f"),
     ),
 )
 def acquisition(report: ReportedTest, _style: Style) -> Rows:

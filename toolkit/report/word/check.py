@@ -15,6 +15,7 @@ from dataclasses import replace
 from toolkit.report.style import Style
 from toolkit.report.tags import DRAWN, format_problem, parse_tag, width_emu
 from toolkit.report.vocabulary import Vocabulary
+from toolkit.report.word.decimals import coarse_decimals
 from toolkit.report.word.fonts import missing_fonts, undrawn
 from toolkit.report.word.lint import (
     RULES,
@@ -96,6 +97,7 @@ def check_stories(
         *_broken(parts, words),
         *surroundings(package, parts, style),
         *placeholders(parts, style),
+        *coarse_decimals(style, words),
         *unreadable(package, sites, must_be_read(words, style)),
     ]
     if fonts:

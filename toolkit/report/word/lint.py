@@ -43,6 +43,7 @@ RULES = {
     "not-as-chart": "a figure cannot be a chart of Word's own",
     "doubled-tag": "a figure or table stands twice in the body",
     "figure-small": "a figure is so narrow where it stands that its letters cannot be read",
+    "coarse-decimals": "decimals by name are too few for the unit that the style file chooses",
     "bad-format": "the format after the bar does not fit the tag",
     "wrong-place": "a tag stands where it cannot be filled",
     "overlapping-tags": "a tag stands inside a control that will be filled as a whole",
