@@ -202,9 +202,7 @@ def example_unit(name: str) -> str:
     return {"rad": "deg", "1": "%", "Pa": "kPa"}.get(channel.si, channel.si)
 
 
-def _without_marks(
-    lines: list[Line],
-) -> tuple[list[Line], tuple[str, ...]]:
+def _without_marks(lines: list[Line]) -> tuple[list[Line], tuple[str, ...]]:
     # The lines without the column of marks, and its texts.
     header = lines[0][1]
     at = [i for i, cell in enumerate(header) if cell.strip().lower() == MARKS]
@@ -310,11 +308,4 @@ def _refuse(
     expected: str,
     next_step: str = "mend the header row of the table",
 ) -> NoReturn:
-    raise ColumnError(
-        problem,
-        where=path,
-        got=actual,
-        expected=expected,
-        next_step=next_step,
-        rule=rule,
-    )
+    raise ColumnError(problem, where=path, got=actual, expected=expected, next_step=next_step, rule=rule)
