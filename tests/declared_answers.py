@@ -66,7 +66,7 @@ def departures(value: Any, annotation: Any, place: str = "") -> Iterator[str]:
     if annotation is Any:
         return
     if answers._is_table(annotation) and isinstance(value, Mapping):
-        entries = {key: (held, required) for key, held, required in answers._declared(annotation)}
+        entries = {key: (held, required) for key, held, required in answers._entries(annotation)}
         for key in (*entries, *(key for key in value if key not in entries)):
             path = f"{place}.{key}".lstrip(".")
             if key not in entries:

@@ -33,6 +33,7 @@ ANSWERS = {
     command: declared and declared_type(declared)
     for command, declared in declared_answers(command_tree()).items()
 }
+KINDS = {table.__name__: table for declared in ANSWERS.values() for _, table in tables_of(declared)}
 
 
 def ask(capsys: pytest.CaptureFixture[str], command: str, *words: object, registry: Path) -> dict[str, Any]:
@@ -95,11 +96,10 @@ def test_a_command_without_a_declared_answer_is_found() -> None:
 
 @pytest.mark.parametrize("command", list(ANSWERS))
 def test_every_kind_of_entry_says_what_it_is_and_has_a_name_of_its_own(command: str) -> None:
-    kinds = {table.__name__: table for declared in ANSWERS.values() for _, table in tables_of(declared)}
     for _, table in tables_of(ANSWERS[command]):
-        assert kinds[table.__name__] is table
+        assert KINDS[table.__name__] is table
         assert "." in (table.__doc__ or ""), table
-    assert set(answer_schema(ANSWERS[command])["$defs"]) <= set(kinds)
+    assert set(answer_schema(ANSWERS[command])["$defs"]) <= set(KINDS)
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ def effects_named(modules: Sequence[Module]) -> list[Mention]:
             continue
         if module.name in PLAN_KEYS:
             continue
-        at = {pair for pair in _words(module.tree, names) if pair[1] != module.path.stem}
+        at = {pair for pair in _words(module.nodes, names) if pair[1] != module.path.stem}
         mentions += [Mention(module.name, line, word) for line, word in sorted(at)]
     return mentions
 
@@ -80,8 +80,7 @@ def _imports_effects(module: Module) -> bool:
     return False
 
 
-def _words(tree: ast.Module, names: frozenset[str]) -> Iterator[tuple[int, str]]:
-    nodes = list(ast.walk(tree))
+def _words(nodes: Sequence[ast.AST], names: frozenset[str]) -> Iterator[tuple[int, str]]:
     # Strings that stand as statements: docstrings, and remarks below attributes.
     free = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
     # Keys of a declared entry are words of that file.

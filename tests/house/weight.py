@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.house.source import PACKAGE, ROOT, Module
+from tests.house.source import PACKAGE, ROOT, Module, walk
 from tests.house.structure import NO_COMMAND_ASKED
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -70,7 +70,7 @@ def _shape(function: ast.FunctionDef) -> tuple[tuple[str, str], ...]:
     """Return what a function does without its names, constants, annotations and documentation."""
     body = (statement for statement in function.body if not _is_text(statement))
     return tuple(
-        (type(node).__name__, getattr(node, "attr", "")) for statement in body for node in ast.walk(statement)
+        (type(node).__name__, getattr(node, "attr", "")) for statement in body for node in walk(statement)
     )
 
 

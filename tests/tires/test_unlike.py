@@ -119,16 +119,15 @@ def holds(estimate, truth):
 
 def test_forces_and_stiffnesses_of_single_loads_hold_where_the_slip_angle_is_noisy():
     """Rows taken alike held the force at zero in 85 of 100, the stiffness in 82 to 87."""
-    rng, at_zero, stiffness = np.random.default_rng(4), [], []
-    for _ in range(40):
-        SA, FZ, FY = recording(rng)
-        for load in _LOADS:
-            mine = load == FZ
-            (fit,) = fit_curves([Curve(SA=SA[mine], y=FY[mine], channel="FY", load_N=load, axes="ISO-W")])
-            at_zero.append(holds(fit.value_at_zero, force(0.0, load)))
-            stiffness.append(holds(fit.slope_at_zero, slope(load)))
-    assert 0.91 <= np.mean(at_zero) <= 0.985
-    assert 0.91 <= np.mean(stiffness) <= 0.985
+    rng = np.random.default_rng(4)
+    curves = [
+        Curve(SA=SA[load == FZ], y=FY[load == FZ], channel="FY", load_N=load, axes="ISO-W")
+        for SA, FZ, FY in (recording(rng) for _ in range(40))
+        for load in _LOADS
+    ]
+    fits = fit_curves(curves)
+    assert 0.91 <= np.mean([holds(fit.value_at_zero, force(0.0, fit.load_N)) for fit in fits]) <= 0.985
+    assert 0.91 <= np.mean([holds(fit.slope_at_zero, slope(fit.load_N)) for fit in fits]) <= 0.985
 
 
 def test_stiffnesses_over_all_loads_hold_where_the_slip_angle_is_noisy():

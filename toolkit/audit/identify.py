@@ -391,9 +391,7 @@ def _in_columns(group: Group, term: str) -> str:
 
     names = group.record.indications
     return re.sub(
-        r"[A-Za-z_]\w*",
-        lambda m: names[group.order[names.index(m[0])]] if m[0] in names else m[0],
-        term,
+        r"[A-Za-z_]\w*", lambda m: names[group.order[names.index(m[0])]] if m[0] in names else m[0], term
     )
 
 

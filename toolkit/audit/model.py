@@ -125,8 +125,7 @@ class Segment:
     last_row: int
     record: Annotated[str | None, Entry("null where it is unknown or ambiguous")]
     variant: Annotated[
-        str | None,
-        Entry("how the record was changed: E5 negative in FY, MZ; what all candidates share"),
+        str | None, Entry("how the record was changed: E5 negative in FY, MZ; what all candidates share")
     ]
     grade: Grade
     candidates: Annotated[tuple[str, ...], Entry("of an ambiguous segment")] = ()

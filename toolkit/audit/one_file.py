@@ -140,8 +140,7 @@ class ArchivedFile:
     grade: Grade
     record: str | None = None
     variant: Annotated[
-        str | None,
-        Entry("how the record was changed: E5 negative in FY, MZ; what all candidates share"),
+        str | None, Entry("how the record was changed: E5 negative in FY, MZ; what all candidates share")
     ] = None
     issued: Annotated[bool | None, Entry("whether the coefficients were those of the certificate")] = None
     candidates: Annotated[tuple[str, ...], Entry("of an ambiguous file")] = ()
@@ -390,12 +389,7 @@ def _sum(stored: float | None, change: float | None) -> float | None:
 
 
 def unreadable(
-    name: str,
-    reason: str,
-    *,
-    sha256: str | None = None,
-    size: int | None = None,
-    context: str | None = None,
+    name: str, reason: str, *, sha256: str | None = None, size: int | None = None, context: str | None = None
 ) -> ArchivedFile:
     """Return the row of a file that cannot be read; ``reason`` begins with a rule id."""
     grade: Grade = "no_recording" if reason.startswith(f"{NO_RECORDING}:") else "unreadable"

@@ -159,10 +159,7 @@ def _by_continuity(
             continue
 
         def times(
-            values: Array,
-            edge: int = edge,
-            wide: tuple[int, int] = wide,
-            places: NDArray[np.intp] = places,
+            values: Array, edge: int = edge, wide: tuple[int, int] = wide, places: NDArray[np.intp] = places
         ) -> float:
             usual = float(np.percentile(np.abs(_step(values, places, wide)), _NOISY))
             floor = 1e-9 * float(np.max(np.abs(values), initial=0.0))

@@ -132,10 +132,7 @@ def steps(recording: Recording, columns: Columns, blocks: Sequence[Block], where
 
 
 def step_findings(
-    recording: Recording,
-    values: Mapping[str, Array],
-    blocks: Sequence[Block],
-    where: str,
+    recording: Recording, values: Mapping[str, Array], blocks: Sequence[Block], where: str
 ) -> tuple[Finding, ...]:
     """Return the value that steps most where load and slip angle stand still, as a finding; empty: none."""
     step = sudden_step(values, conditions_of(recording), blocks)

@@ -50,11 +50,7 @@ _Key = tuple[Characteristic, float, str, float | None]
 
 
 def characterise(
-    reduced: ReducedTest,
-    *,
-    machine: Machine,
-    record: CalibrationRecord | None,
-    sweeps: Sequence[Sweep] = (),
+    reduced: ReducedTest, *, machine: Machine, record: CalibrationRecord | None, sweeps: Sequence[Sweep] = ()
 ) -> Characteristics:
     """Fit every load and direction and derive the characteristics.
 
@@ -70,11 +66,7 @@ def characterise(
     return Characteristics(
         fits=fits,
         rows=tuple(replace(row, parts=()) for row in rows_of(directions, shared=shared)),
-        findings=(
-            *findings,
-            *_line_findings(directions),
-            *sweep_findings(sweeps, lags, directions),
-        ),
+        findings=(*findings, *_line_findings(directions), *sweep_findings(sweeps, lags, directions)),
         sweeps=swept,
         points=tuple(
             Point(file=file, first_row=row, u_FY=u["FY"], u_MZ=u["MZ"])

@@ -190,11 +190,7 @@ STIFFNESS = WideTable(
     answer="stiffness",
 )
 PULL = WideTable(
-    name="pull",
-    scope="load",
-    text="pull characteristics by symmetry, one row a load",
-    place=2,
-    answer="pull",
+    name="pull", scope="load", text="pull characteristics by symmetry, one row a load", place=2, answer="pull"
 )
 PULL_THESIS = WideTable(
     name="pull_thesis",
@@ -268,9 +264,7 @@ class BudgetColumn:
 
 COLUMNS = (
     BudgetColumn(
-        name="calibration",
-        sources=(CALIBRATION,),
-        text="calibration record: fit and what its session stated",
+        name="calibration", sources=(CALIBRATION,), text="calibration record: fit and what its session stated"
     ),
     BudgetColumn(
         name="zero",

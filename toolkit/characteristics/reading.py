@@ -329,8 +329,6 @@ def _signed(number: Uncertain | None, sign: float) -> Uncertain | None:
 
 
 def _crosses_zero(direction: Direction) -> bool:
-    from toolkit.tires.evaluate import zero_crossing
-
     return direction.fit.FY is not None and zero_crossing(direction.fit.FY) is not None
 
 

@@ -108,7 +108,7 @@ def docs(
     return 0
 
 
-@answers("toolkit.lab.upkeep.installation:QualifyAnswer")
+@answers("toolkit.qualification.model:QualificationRecord")
 def qualify(
     out: Annotated[Path | None, "Write the record here: .json, else as text.", INTO_FILE] = None,
     *,
@@ -118,18 +118,16 @@ def qualify(
 
     Example: toolkit qualify --out qualification.json
     """
-    from toolkit.declared import json_value
+    from toolkit.declared import answer
     from toolkit.lab.home import packaged_home
-    from toolkit.lab.upkeep.installation import qualification_payload, qualification_text
+    from toolkit.lab.upkeep.installation import qualification_text
     from toolkit.publication import write_result
     from toolkit.qualification.run import qualify as run
 
     record = run(calibrations=packaged_home() / "calibrations", on=datetime.now(tz=UTC).date())
-    payload, text = qualification_payload(record), qualification_text(record)
+    payload, text = answer(record), qualification_text(record)
     if out is not None:
-        document = json.dumps(
-            {"schema": 1, **json_value(payload)}, ensure_ascii=False, indent=2, allow_nan=False
-        )
+        document = json.dumps(payload, ensure_ascii=False, indent=2, allow_nan=False)
         write_result(out, (document if out.suffix.lower() == ".json" else text) + "\n")
         text += f"\nwritten: {out}"
     output.answer(payload, text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict, cast
+from typing import TYPE_CHECKING, Annotated, TypedDict, cast, get_args
 
 import typer
 
@@ -143,8 +143,6 @@ def policy(
 
     Example: toolkit person policy withdraw --role head --signatures 2 --reason "audit of May" --sign anna
     """
-    from typing import get_args
-
     from toolkit.lab.signatures.people import people_answer, set_demand
     from toolkit.trust.people import Action
 

@@ -103,18 +103,13 @@ def entry_of(declared: type[T], /, *sources: object, **stated: Any) -> T:
         something is stated that is not declared
     """
     entry, kind = dict(stated), cast("Any", declared)
-    for key, held, required in _declared(kind):
+    for key, held, required in _entries(kind):
         source = next((source for source in sources if hasattr(source, key)), None)
         if key not in entry and (required or source is not None):
             entry[key] = _filled(getattr(source, key), held)
-    if surplus := entry.keys() - {key for key, _, _ in _declared(kind)}:
+    if surplus := entry.keys() - {key for key, _, _ in _entries(kind)}:
         raise TypeError(f"{kind.__name__} declares no {', '.join(sorted(surplus))}")
-    return cast("T", {key: entry[key] for key, _, _ in _declared(kind) if key in entry})
-
-
-@functools.cache
-def _declared(cls: Hashable) -> tuple[tuple[str, Any, bool], ...]:
-    return tuple(_entries(cls))
+    return cast("T", {key: entry[key] for key, _, _ in _entries(kind) if key in entry})
 
 
 def _filled(value: Any, annotation: Any) -> Any:
@@ -172,16 +167,17 @@ def _is_table(annotation: Any) -> bool:
     return is_typeddict(annotation) or (isinstance(annotation, type) and dataclasses.is_dataclass(annotation))
 
 
-def _entries(cls: Any) -> Iterator[tuple[str, Any, bool]]:
-    """Yield key, annotation and whether every answer has it."""
-    if not is_typeddict(cls):
-        for output in outputs_of(cls):
-            held = _but_null(output.annotation) if output.sparse else output.annotation
-            yield output.key, held, not output.sparse
-        return
-    for key, annotation in typing.get_type_hints(cls, include_extras=True).items():
+@functools.cache
+def _entries(cls: Hashable) -> tuple[tuple[str, Any, bool], ...]:
+    """Return key, annotation and whether every answer has it."""
+    if is_typeddict(cls):
+        hints = typing.get_type_hints(cls, include_extras=True).items()
         # `__required_keys__` does not know the marks of annotations that are kept as texts.
-        yield key, annotation, get_origin(annotation) is not typing.NotRequired
+        return tuple((key, held, get_origin(held) is not typing.NotRequired) for key, held in hints)
+    return tuple(
+        (output.key, _but_null(output.annotation) if output.sparse else output.annotation, not output.sparse)
+        for output in outputs_of(cls)
+    )
 
 
 def _but_null(annotation: Any) -> Any:

@@ -97,11 +97,7 @@ def columns_of(
 
 
 def tire_table(
-    data: Columns,
-    *,
-    units: Mapping[str, str] | None = None,
-    axes: str = "SAE",
-    measured: bool = True,
+    data: Columns, *, units: Mapping[str, str] | None = None, axes: str = "SAE", measured: bool = True
 ) -> TireTable:
     """Return columns of tire data as `toolkit.tires.table.read_table` returns a file, with all its checks.
 

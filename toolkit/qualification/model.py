@@ -9,8 +9,9 @@ import math
 from dataclasses import dataclass
 from datetime import date
 from decimal import Decimal, InvalidOperation
-from typing import Literal
+from typing import Annotated, Literal
 
+from toolkit.declared import Entry, Keyed, derived
 from toolkit.errors import ConfigError
 
 Measure = Literal["correct digits", "units of the last digit", "share of the largest load", "text", "rules"]
@@ -46,14 +47,14 @@ class NotCovered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QualificationRecord:
-    """The outcome on one day, of one version on one machine's libraries.
+    """What this installation computes, held against certified values, on one day.
 
-    ``packages`` are the versions that change numbers; ``numbers_sha256`` identifies the packaged numbers.
+    ``numbers_sha256`` identifies the packaged numbers.
     """
 
     software: str
     python: str
-    packages: tuple[tuple[str, str], ...]
+    packages: Annotated[tuple[tuple[str, str], ...], Keyed(), Entry("versions that change numbers")]
     platform: str
     date: date
     numbers_sha256: str
@@ -61,6 +62,7 @@ class QualificationRecord:
     not_covered: tuple[NotCovered, ...]
 
     @property
+    @derived(after="")
     def passed(self) -> bool:
         """Whether every check passed, and there was one."""
         return bool(self.checks) and all(check.passed for check in self.checks)

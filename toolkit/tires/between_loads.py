@@ -16,7 +16,7 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.tires.global_data import Measured
-from toolkit.tires.global_model import Departure, GlobalModel, Rows, make_rows
+from toolkit.tires.global_model import Departure, GlobalModel, Rows
 
 LIMIT = {2: 0.125, 3: 0.10}
 """Of the largest value at a load, by how many loads tell what to expect.
@@ -115,10 +115,8 @@ class Between:
         slips = np.linspace(swept.min(), swept.max(), _SLIPS)
         load, slip = (a.ravel() for a in np.meshgrid([*self.loads, *self._inner], slips, indexing="ij"))
         SA, KAPPA = (_least(still), slip) if channel == "FX" else (slip, _least(still))
-        return make_rows(
-            SA, load, KAPPA=KAPPA, IA=_least(r.IA), P=float(np.median(r.P)), V=float(np.median(r.V)),
-            FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
-        )  # fmt: skip
+        P, V = float(np.median(r.P)), float(np.median(r.V))
+        return r.other(SA, load, KAPPA=KAPPA, IA=_least(r.IA), P=P, V=V)
 
 
 def _domain(data: Measured) -> Rows:
@@ -129,10 +127,7 @@ def _domain(data: Measured) -> Rows:
         camber = np.array([camber[0], 0.0, camber[-1]])
     load = np.linspace(r.FZ.min(), r.FZ.max(), _LOADS)
     FZ, IA, P = (column.ravel() for column in np.meshgrid(load, camber, pressure))
-    return make_rows(
-        0.0, FZ, IA=IA, P=P, V=r.LONGVL, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
-        UNLOADED_RADIUS=r.UNLOADED_RADIUS,
-    )  # fmt: skip
+    return r.other(0.0, FZ, IA=IA, P=P)
 
 
 def _least(column: Array) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.arrays import Array
+from toolkit.arrays import Array, taken
 
 _TOLERANCE = 1e-11  # of the carcass's slopes, rad
 _ROUNDS = 25  # of Broyden's method; most states need five to ten
@@ -47,16 +47,7 @@ class Tread:
 
     def take(self, index: NDArray[np.intp]) -> Tread:
         """Return some of the cases."""
-        return Tread(
-            limit=self.limit[:, index],
-            half_C=self.half_C[index],
-            fade=self.fade[index],
-            yaw=self.yaw[index],
-            bend=self.bend[index],
-            curve=self.curve[index],
-            cone=self.cone[index],
-            edge=self.edge[index],
-        )
+        return taken(self, index, last=True)
 
 
 def summed(of_middles: Array) -> Array:
@@ -94,12 +85,7 @@ class Balance:
 
     def take(self, index: NDArray[np.intp]) -> Balance:
         """Return some of the cases."""
-        return Balance(
-            sums=self.sums[:, index],
-            slopes=self.slopes[:, index],
-            inverse=self.inverse[..., index],
-            settled=self.settled[index],
-        )
+        return taken(self, index, last=True)
 
 
 def balance(tread: Tread, sx: Array, sy: Array, *, lines: int = 1, near: Balance | None = None) -> Balance:

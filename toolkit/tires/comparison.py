@@ -15,7 +15,7 @@ from toolkit.reduction.selection import of_one_condition
 from toolkit.tires.evaluate import value_at
 from toolkit.tires.global_data import CHANNELS, Measured, cell
 from toolkit.tires.global_fit import undetermined
-from toolkit.tires.global_model import GlobalModel, ModelFit, make_rows, pooled_percent
+from toolkit.tires.global_model import GlobalModel, ModelFit, pooled_percent
 from toolkit.tires.model import CurveFit
 from toolkit.tires.models import model as find_curve_model
 from toolkit.tires.quality import scatter_floor_percent
@@ -173,11 +173,7 @@ def model_curve(
 ) -> Array:
     """Return a fitted model at slip angles [rad] and a load [N] in the data's axes, upright, free rolling."""
     flip = signs(data.axes, model.axes)
-    r = data.rows
-    rows = make_rows(
-        flip["SA"] * np.asarray(SA), load_N, FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL,
-        UNLOADED_RADIUS=r.UNLOADED_RADIUS,
-    )  # fmt: skip
+    rows = data.rows.other(flip["SA"] * np.asarray(SA), load_N)
     with np.errstate(all="ignore"):
         predicted = model.forces(fit.values.tolist(), rows)[channel]
     return np.asarray(flip.get(channel, 1) * np.broadcast_to(predicted, len(rows)))

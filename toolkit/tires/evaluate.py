@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from toolkit.arrays import Array
 from toolkit.estimate import Estimate
-from toolkit.tires.global_model import GlobalModel, Rows, make_rows
+from toolkit.tires.global_model import GlobalModel, Rows
 from toolkit.tires.model import CHANNEL_UNIT, CurveFit
 from toolkit.tires.models import model
 from toolkit.tires.recorded import as_array
@@ -136,11 +136,7 @@ def stiffness(model: GlobalModel, values: Sequence[Any], *, load: float, like: R
     """
 
     def curve(SA: Array) -> Array:
-        rows = make_rows(
-            SA, load, FNOMIN=like.FNOMIN, NOMPRES=like.NOMPRES, LONGVL=like.LONGVL,
-            UNLOADED_RADIUS=like.UNLOADED_RADIUS,
-        )  # fmt: skip
         with np.errstate(all="ignore"):
-            return model.forces(values, rows)[channel]
+            return model.forces(values, like.other(SA, load))[channel]
 
     return limit_slope(curve)

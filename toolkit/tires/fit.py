@@ -220,16 +220,7 @@ def _fit_group(
     noise = noise_of(residual * problems.sw, columns, lengths, cost, scale.known, parts)
     spreads = spread(solution, problems, zero=-scale.middle / scale.half, noise=noise)
     return [
-        _result(
-            curve,
-            i,
-            solution,
-            spreads,
-            scale,
-            residual[i, : len(curve.y)],
-            float(noise.time[i]),
-            loss,
-        )
+        _result(curve, i, solution, spreads, scale, residual[i, : len(curve.y)], float(noise.time[i]), loss)
         for i, curve in enumerate(curves)
     ]
 

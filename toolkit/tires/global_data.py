@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -117,15 +117,9 @@ class Measured:
     def turned(self, axes: Axes) -> Measured:
         """Return the same rows in other axes."""
         flip = signs(self.axes, axes)
-        r = self.rows
-        rows = make_rows(
-            flip["SA"] * r.SA, r.FZ, IA=r.IA, P=r.P, V=r.V, KAPPA=r.KAPPA, FNOMIN=r.FNOMIN,
-            NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
-        )  # fmt: skip
-        return Measured(
-            rows=rows, axes=axes, block=self.block, loads=self.loads, recorded=self.recorded,
-            **{name: flip.get(name, 1) * self[name] for name in self.channels},
-        )  # fmt: skip
+        rows = replace(self.rows, SA=flip["SA"] * self.rows.SA)
+        responses: dict[str, Any] = {name: flip.get(name, 1) * self[name] for name in self.channels}
+        return replace(self, rows=rows, axes=axes, **responses)
 
 
 def measured(
@@ -251,14 +245,12 @@ def binned(data: Measured, *, robust: bool = False, most: int | None = None) -> 
             return np.array([np.median(part) for part in np.split(column[order], cuts)])
         return np.bincount(place, column, bins) / count
 
-    r = data.rows
-    rows = make_rows(
-        middle(r.SA), middle(r.FZ), IA=middle(r.IA), P=middle(r.P), V=middle(r.V), KAPPA=middle(r.KAPPA),
-        FNOMIN=r.FNOMIN, NOMPRES=r.NOMPRES, LONGVL=r.LONGVL, UNLOADED_RADIUS=r.UNLOADED_RADIUS,
-    )  # fmt: skip
+    columns: dict[str, Any] = {
+        name: middle(getattr(data.rows, name)) for name in ("SA", "FZ", "IA", "P", "V", "KAPPA")
+    }
     first = order[np.concatenate([[0], cuts])]
     means = Measured(
-        rows=rows, axes=data.axes, block=data.block[first], loads=data.loads,
+        rows=replace(data.rows, **columns), axes=data.axes, block=data.block[first], loads=data.loads,
         recorded={name: middle(column) for name, column in data.recorded.items()},
         **{name: middle(data[name]) for name in data.channels},
     )  # fmt: skip

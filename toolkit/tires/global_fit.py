@@ -370,11 +370,7 @@ class _Fitter:
         return tuple(free), tuple(fixed)
 
     def _run(
-        self,
-        channels: tuple[str, ...],
-        free: tuple[int, ...],
-        data: Measured,
-        more: tuple[Array, ...] = (),
+        self, channels: tuple[str, ...], free: tuple[int, ...], data: Measured, more: tuple[Array, ...] = ()
     ) -> StageFit:
         robust = self.loss == "robust"
         coarse, count, width = self._bins(data)

@@ -44,7 +44,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.arrays import Array
+from toolkit.arrays import Array, taken
 from toolkit.channels import Axes
 from toolkit.estimate import Estimate
 from toolkit.reduction.selection import Selection
@@ -144,18 +144,12 @@ class Rows:
 
     def take(self, index: NDArray[Any]) -> Rows:
         """Return some of the rows, by index or mask."""
-        return Rows(
-            SA=self.SA[index],
-            FZ=self.FZ[index],
-            IA=self.IA[index],
-            P=self.P[index],
-            V=self.V[index],
-            KAPPA=self.KAPPA[index],
-            FNOMIN=self.FNOMIN,
-            NOMPRES=self.NOMPRES,
-            LONGVL=self.LONGVL,
-            UNLOADED_RADIUS=self.UNLOADED_RADIUS,
-        )
+        return taken(self, index)
+
+    def other(self, SA: object, FZ: object, **columns: Any) -> Rows:
+        """Return other rows, as `make_rows` has them, under the same nominal values."""
+        nominal = ("FNOMIN", "NOMPRES", "LONGVL", "UNLOADED_RADIUS")
+        return make_rows(SA, FZ, **columns, **{name: getattr(self, name) for name in nominal})
 
 
 def make_rows(

@@ -24,7 +24,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.arrays import Array
+from toolkit.arrays import Array, taken
 
 Array32 = NDArray[np.float32]
 
@@ -48,19 +48,9 @@ class Problems:
     low: Array
     high: Array
 
-    def take(self, index: NDArray[np.intp]) -> Problems:
+    def take(self, index: NDArray[np.intp] | slice) -> Problems:
         """Return the problems of an index, repeats allowed."""
-        return Problems(
-            u=self.u[index],
-            y=self.y[index],
-            sw=self.sw[index],
-            low=self.low[index],
-            high=self.high[index],
-        )
-
-    def weighted(self, sw: Array) -> Problems:
-        """Return the same problems with other weights."""
-        return Problems(u=self.u, y=self.y, sw=sw, low=self.low, high=self.high)
+        return taken(self, index)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -83,7 +73,7 @@ class State:
 
     def take(self, index: NDArray[np.intp]) -> State:
         """Return the states of an index."""
-        return State(**{name: getattr(self, name)[index] for name in _FIELDS})
+        return taken(self, index)
 
     def put(self, where: NDArray[np.bool_], state: State) -> None:
         """Take over the other's entries where a mask is true."""
@@ -148,29 +138,13 @@ def assess(p: Array, problems: Problems) -> State:
     scratch = _Scratch(size, points)
     if count <= size:
         return _assess(p, problems, scratch)
-    state = State(
-        p=p,
-        linear=np.empty((count, 2)),
-        cost=np.empty(count),
-        gradient=np.empty((count, 4)),
-        square=np.empty((count, 4, 4)),
-        cross=np.empty((count, 4, 2)),
-        gram=np.empty((count, 2, 2)),
-        held=np.empty((count, 2), dtype=np.bool_),
-    )
-    for first in range(0, count, size):
-        block = slice(first, first + size)
-        part = Problems(
-            u=problems.u[block],
-            y=problems.y[block],
-            sw=problems.sw[block],
-            low=problems.low,
-            high=problems.high,
-        )
-        assessed = _assess(p[block], part, scratch)
-        for name in _FIELDS[1:]:
-            getattr(state, name)[block] = getattr(assessed, name)
-    return state
+    blocks = [slice(first, first + size) for first in range(0, count, size)]
+    parts = []
+    for block in blocks:
+        assessed = _assess(p[block], problems.take(block), scratch)
+        parts.append(assessed)
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _FIELDS[1:]}
+    return State(p=p, **joined)
 
 
 _BLOCK = 24_576  # points
@@ -288,10 +262,8 @@ _B = (0.08, 0.2, 0.5, 1.0, 1.8, 3.2, 6.0, 12.0, 24.0)
 _C = (0.35, 0.7, 1.1, 1.6, 2.2, 2.9, 3.6)
 _E = (-19.0, -6.0, -2.0, -0.3, 0.5, 0.9)
 _H = (-3.0, -1.8, -1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2, 1.8, 3.0)
-_SHAPE_BLOCK = (
-    16,
-    378,
-)  # curves and shapes: 16 x 378 x 40 nodes is under 2^18, below which OpenBLAS stays alone
+# Curves and shapes: 16 x 378 x 40 nodes is under 2^18, below which OpenBLAS stays alone.
+_SHAPE_BLOCK = (16, 378)
 _AT_ONCE = 32
 _GRID = (len(_B), len(_C), len(_E), len(_H))
 

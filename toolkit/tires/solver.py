@@ -8,7 +8,7 @@ several starts end at the same lowest cost: an optimiser's own flag is true on m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -291,13 +291,8 @@ def compress(problems: Problems) -> Problems:
     safe = np.where(total > 0, total, 1.0)
     u = np.bincount(slot, (w * problems.u).ravel(), curves * _BINS) / safe
     y = np.bincount(slot, (w * problems.y).ravel(), curves * _BINS) / safe
-    return Problems(
-        u=u.reshape(curves, _BINS),
-        y=y.reshape(curves, _BINS),
-        sw=np.sqrt(total).reshape(curves, _BINS),
-        low=problems.low,
-        high=problems.high,
-    )
+    u, y, sw = (column.reshape(curves, _BINS) for column in (u, y, np.sqrt(total)))
+    return replace(problems, u=u, y=y, sw=sw)
 
 
 def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
@@ -319,7 +314,7 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
     for _ in range(8):
         residual = np.abs(_residual(state, many))
         width = 0.1 * median(residual * many.sw, once[owner]) + 1e-12
-        part = many.weighted(many.sw / np.sqrt(np.sqrt(residual**2 + width[:, None] ** 2)))
+        part = replace(many, sw=many.sw / np.sqrt(np.sqrt(residual**2 + width[:, None] ** 2)))
         state = descend(state.p, part, steps=4, tolerance=1e-4)
     size = np.sum(np.abs(_residual(state, many)) * many.sw, axis=1).reshape(curves, many_starts)
     agreeing = np.sum(size <= size.min(axis=1)[:, None] * 1.02 + 1e-12, axis=1)
@@ -329,7 +324,7 @@ def solve_robust(problems: Problems) -> tuple[Solution, Problems, Array]:
     for _ in range(25):
         share = _residual(state, problems) * problems.sw / (_BIWEIGHT * scale[:, None])
         weight = np.clip(1.0 - share**2, 0.0, None)
-        part = problems.weighted(problems.sw * np.maximum(weight, 1e-9))
+        part = replace(problems, sw=problems.sw * np.maximum(weight, 1e-9))
         before = state.cost
         state = descend(state.p, part, steps=6, tolerance=1e-9)
         if np.all(np.abs(state.cost - before) <= 1e-6 * before):
@@ -354,7 +349,7 @@ def _cut(problems: Problems) -> Problems:
     middle = median(problems.y, once)[:, None]
     room = _ROOM * median(np.abs(problems.y - middle), once, _MOST)[:, None]
     cut = np.where(weighted, np.clip(problems.y, middle - room, middle + room), 0.0)
-    return Problems(u=problems.u, y=cut, sw=problems.sw, low=problems.low, high=problems.high)
+    return replace(problems, y=cut)
 
 
 _MOST, _ROOM = 0.75, 2.0  # a quarter of the rows may be outliers; the others stay as they are

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
 from typing import NoReturn, get_args
@@ -68,14 +68,8 @@ class TireTable:
 
     def take(self, rows: NDArray[np.bool_]) -> TireTable:
         """Return some of the rows, by a mask."""
-        return TireTable(
-            path=self.path,
-            axes=self.axes,
-            columns=tuple((symbol, column[rows]) for symbol, column in self.columns),
-            header=self.header,
-            cells=tuple(compress(self.cells, rows)),
-            marks=self.marks,
-        )
+        columns = tuple((symbol, column[rows]) for symbol, column in self.columns)
+        return replace(self, columns=columns, cells=tuple(compress(self.cells, rows)))
 
     def get(self, symbol: str) -> Array | None:
         """Return a column [SI], None where the table has none."""
@@ -208,9 +202,7 @@ def example_unit(name: str) -> str:
     return {"rad": "deg", "1": "%", "Pa": "kPa"}.get(channel.si, channel.si)
 
 
-def _without_marks(
-    lines: list[Line],
-) -> tuple[list[Line], tuple[str, ...]]:
+def _without_marks(lines: list[Line]) -> tuple[list[Line], tuple[str, ...]]:
     # The lines without the column of marks, and its texts.
     header = lines[0][1]
     at = [i for i, cell in enumerate(header) if cell.strip().lower() == MARKS]
@@ -316,11 +308,4 @@ def _refuse(
     expected: str,
     next_step: str = "mend the header row of the table",
 ) -> NoReturn:
-    raise ColumnError(
-        problem,
-        where=path,
-        got=actual,
-        expected=expected,
-        next_step=next_step,
-        rule=rule,
-    )
+    raise ColumnError(problem, where=path, got=actual, expected=expected, next_step=next_step, rule=rule)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.arrays import Array
+from toolkit.arrays import Array, taken
 
 _STEPS = 200
 _SETTLED = 2e-5  # of the mean variance of a row
@@ -79,7 +79,7 @@ def unlike_rows(residual: Array, columns: Array, parts: Array, *, own: int = 1) 
     for _ in range(_STEPS):
         if not len(going):
             break
-        score = _score(theta[going], groups.take(going))
+        score = _score(theta[going], taken(groups, going))
         before = theta[going]
         after = before * np.divide(
             score.square, score.trace, out=np.zeros_like(before), where=score.trace > 0
@@ -100,10 +100,6 @@ class _Groups:
     products: Array
     rows: Array
     d: Array
-
-    def take(self, curves: NDArray[np.intp]) -> _Groups:
-        """Return those of some curves."""
-        return _Groups(products=self.products[curves], rows=self.rows[curves], d=self.d[curves])
 
 
 def _groups(z: Array, d: Array, own: int) -> _Groups:

@@ -77,10 +77,7 @@ def make_key(path: Path, passphrase: str, comment: str) -> PublicKey:
     name = path.with_name(path.name + ".pub")
     written: list[Path] = []
     try:
-        for place, data, mode in (
-            (path, text, 0o600),
-            (name, f"{public.line} {comment}\n".encode(), 0o644),
-        ):
+        for place, data, mode in ((path, text, 0o600), (name, f"{public.line} {comment}\n".encode(), 0o644)):
             _write_new(place, data, mode, written)
     except OSError as error:
         for place in written:  # a key without its public half is none

@@ -62,8 +62,7 @@ def _is_moment(text: str) -> bool:
 
 
 _Moment = Annotated[
-    str,
-    Text(strip=True, pattern=r"\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}Z", accepts=_is_moment),
+    str, Text(strip=True, pattern=r"\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}Z", accepts=_is_moment)
 ]
 _TIME = "a UTC time such as 2026-11-22T10:11:12Z"
 

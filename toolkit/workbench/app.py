@@ -54,14 +54,8 @@ def _content(name: str) -> tuple[str, bytes]:
 
 def application(home: Path, registry: Registry, keys: Keys, *, person: Person | None = None) -> Starlette:
     """Return the pages of a home below the place of its keys; `guard.Guard` stands before them."""
-    routes = [
-        Route("/static/{name}", static, name="static"),
-        *_routes(),
-    ]
-    app = Starlette(
-        routes=[Mount(keys.place, routes=routes)],
-        exception_handlers={HTTPException: _no_page},
-    )
+    routes = [Route("/static/{name}", static, name="static"), *_routes()]
+    app = Starlette(routes=[Mount(keys.place, routes=routes)], exception_handlers={HTTPException: _no_page})
     app.state.bench = Bench(home, registry, keys, person=person)
     return app
 

@@ -138,10 +138,7 @@ class Guard:
         if headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
             return _Refusal(403, "Another page asked for this; only the workbench's own pages may.")
         if not compare_digest(_cookie(headers).encode(), self.keys.cookie.encode()):
-            return _Refusal(
-                401,
-                "This browser is not let in. Open the address that 'toolkit open' printed.",
-            )
+            return _Refusal(401, "This browser is not let in. Open the address that 'toolkit open' printed.")
         if scope["method"] == "POST" and headers.getlist("origin") != [self.origin]:
             return _Refusal(403, "Another page sent this; only the workbench's own pages may.")
         return None

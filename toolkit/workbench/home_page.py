@@ -83,7 +83,4 @@ _QUESTIONS: dict[str, Callable[[Bench], dict[str, Any]]] = {
 }
 
 
-ROUTES: Routes = (
-    ("GET", "/", home),
-    ("GET", "/agenda/{question}", agenda),
-)
+ROUTES: Routes = (("GET", "/", home), ("GET", "/agenda/{question}", agenda))

@@ -21,7 +21,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import NoReturn
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, ToolkitError
 from toolkit.system import THREADS, can_fork
 from toolkit.worker.walls import Walls, libc
 
@@ -133,8 +133,6 @@ def main(numbers: tuple[int, ...], scratch: str, parent: int) -> NoReturn:
 
 def _guarded(limits: Limits, ends: list[int], scratch: str, parent: int) -> NoReturn:
     """Be the guardian; never return into what the parent was doing."""
-    from toolkit.errors import ToolkitError
-
     status = ends[2]
     try:
         gc.freeze()  # looking through the parent's objects would copy every page of its memory

@@ -15,7 +15,7 @@ from toolkit.errors import RenderError
 from toolkit.report.content import ReportContent, signature_text
 from toolkit.report.style import Style
 from toolkit.report.test.content import build_content
-from toolkit.report.word import closing
+from toolkit.report.word import closing, preview
 from toolkit.report.word.fill import fill
 
 SIGNED = CalibrationUse(
@@ -100,7 +100,7 @@ def _caption(top: float) -> list[tuple[float, float, str]]:
 
 def test_the_code_stands_below_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
     listing = _listing((60, 40, "Header"), *_caption(100), (60, 400, "End"))
-    monkeypatch.setattr(closing, "poppler", lambda _words: listing)
+    monkeypatch.setattr(preview, "poppler", lambda _words: listing)
     place = closing.place_of_symbol(Path("x.pdf"), 7, _content().issued_by(None))
     lines = -(-len(closing.CAPTION.split()) // 15)
     assert (place.page, place.left, place.size) == (6, 60.0, closing.SIZE)
@@ -118,7 +118,7 @@ def test_the_code_stands_below_its_words(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_page_without_a_place_is_refused(
     words: list[tuple[float, float, str]], why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(closing, "poppler", lambda _words: _listing(*words))
+    monkeypatch.setattr(preview, "poppler", lambda _words: _listing(*words))
     with pytest.raises(RenderError) as refusal:
         closing.place_of_symbol(Path("x.pdf"), 1, _content().issued_by(None))
     assert refusal.value.rule == "proof-place"

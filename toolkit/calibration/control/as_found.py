@@ -13,6 +13,7 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from toolkit.calibration.registry.status import status_of
 from toolkit.calibration.registry.stored import stored_loads
 from toolkit.calibration.session.statements import entries_of
 from toolkit.calibration.session.table import Table
+from toolkit.declared import Entry, derived
 from toolkit.errors import ToolkitError, UnitError
 from toolkit.files import sha256_bytes
 from toolkit.findings import Finding
@@ -131,22 +133,20 @@ _SLACK = 1 + 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AsFoundLoad:
-    """One load, in ``unit``: reference and error (fitted - reference) of each row, tolerance, worst row.
-
-    ``full_scale`` is the largest load of the session; ``worst_row`` counts from 1.
-    """
+    """The errors of a session's rows by the record that was in force before it."""
 
     load: str
     unit: str
-    reference: tuple[float, ...]
-    error: tuple[float, ...]
+    reference: Annotated[tuple[float, ...], Entry("of each row")]
+    error: Annotated[tuple[float, ...], Entry("fitted minus reference of each row")]
     tolerance: float
-    full_scale: float
-    max_error: float
+    full_scale: Annotated[float, Entry("the largest load of the session")]
+    max_error: Annotated[float, Entry("the largest one, with its sign")]
     max_percent_fs: float
-    worst_row: int
+    worst_row: Annotated[int, Entry("from 1")]
 
     @property
+    @derived()
     def within(self) -> bool:
         """Whether no error is beyond the tolerance."""
         return abs(self.max_error) <= self.tolerance * _SLACK

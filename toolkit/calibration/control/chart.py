@@ -16,13 +16,7 @@ from typing import Annotated
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.calibration.control.as_found import (
-    Approvals,
-    approvals_of,
-    errors_by,
-    in_use_before,
-    phase_of,
-)
+from toolkit.calibration.control.as_found import Approvals, approvals_of, errors_by, in_use_before, phase_of
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.ledger import Ledger
 from toolkit.calibration.registry.registry import Registry, load_many

@@ -350,11 +350,7 @@ def _provenance(points: Sequence[Point], point: Point) -> dict[str, Any]:
         "U": point.U,
         "unit": _UNITS[point.dimension],
         "range": [min(values), max(values)],
-        "xpath": {
-            "U": point.U_path,
-            "k": point.k_path,
-            "range": sorted({p.value_path for p in points}),
-        },
+        "xpath": {"U": point.U_path, "k": point.k_path, "range": sorted({p.value_path for p in points})},
     }
 
 

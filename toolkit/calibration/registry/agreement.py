@@ -14,13 +14,7 @@ import numpy as np
 
 from toolkit.calibration.records.record import CalibrationRecord
 from toolkit.calibration.registry.legacy import read_legacy
-from toolkit.calibration.session.settings import (
-    Settings,
-    dcc_name,
-    inputs_hash,
-    parse_session,
-    settings_of,
-)
+from toolkit.calibration.session.settings import Settings, dcc_name, inputs_hash, parse_session, settings_of
 from toolkit.calibration.session.table import Table
 from toolkit.errors import RecordError, ToolkitError
 

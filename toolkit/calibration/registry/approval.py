@@ -133,13 +133,7 @@ def approve(
 
 
 def withdraw(
-    registry: Registry,
-    record_id: str,
-    *,
-    on: dt.date,
-    void_from: dt.date | None = None,
-    reason: str,
-    by: str,
+    registry: Registry, record_id: str, *, on: dt.date, void_from: dt.date | None = None, reason: str, by: str
 ) -> RecordStatus:
     """Withdraw a record: ``on`` is when the fault became known, ``void_from`` the first void day.
 

@@ -162,10 +162,7 @@ def _entered(
 
 
 def _approved(
-    entry: Entry,
-    before: Sequence[Entry],
-    record: CalibrationRecord | None,
-    today: Callable[[], date] | None,
+    entry: Entry, before: Sequence[Entry], record: CalibrationRecord | None, today: Callable[[], date] | None
 ) -> Iterator[RegistryError]:
     day, since = entry.known_on, entry.since
     if day is None or since is None:
@@ -215,10 +212,7 @@ def _approved(
 
 
 def _withdrawn(
-    entry: Entry,
-    before: Sequence[Entry],
-    record: CalibrationRecord | None,
-    today: Callable[[], date] | None,
+    entry: Entry, before: Sequence[Entry], record: CalibrationRecord | None, today: Callable[[], date] | None
 ) -> Iterator[RegistryError]:
     yield from _stated(entry, "a withdrawal", "withdrawal", "withdraws")
     yield from _untimely(entry, record, "the day on which the fault became known", today)
@@ -244,10 +238,7 @@ def _withdrawn(
 
 
 def _discarded(
-    entry: Entry,
-    before: Sequence[Entry],
-    record: CalibrationRecord | None,
-    today: Callable[[], date] | None,
+    entry: Entry, before: Sequence[Entry], record: CalibrationRecord | None, today: Callable[[], date] | None
 ) -> Iterator[RegistryError]:
     yield from _stated(entry, "a discard", "discard", "discards")
     yield from _untimely(entry, record, "the day of the decision", today)

@@ -21,13 +21,7 @@ from toolkit.calibration.registry.clock import now
 from toolkit.errors import RegistryError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import read_regular
-from toolkit.system import (
-    close_folder,
-    has_folder_locks,
-    is_open_at,
-    lock_folder,
-    open_folder,
-)
+from toolkit.system import close_folder, has_folder_locks, is_open_at, lock_folder, open_folder
 
 LOCK_FILE = ".lock"
 PATIENCE_S = 10.0

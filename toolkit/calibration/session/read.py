@@ -20,13 +20,7 @@ from toolkit.calibration.session.indications import (
 )
 from toolkit.calibration.session.known_errors import group_column, row_columns
 from toolkit.calibration.session.session_file import CellEntries, SessionFile, session_faults
-from toolkit.calibration.session.settings import (
-    Settings,
-    dcc_name,
-    inputs_hash,
-    parse_session,
-    settings_of,
-)
+from toolkit.calibration.session.settings import Settings, dcc_name, inputs_hash, parse_session, settings_of
 from toolkit.calibration.session.statement_checks import check_columns, check_statements, check_weights
 from toolkit.calibration.session.table import Table, read_table
 from toolkit.declared import Source, refuse

@@ -104,10 +104,7 @@ class Creep:
 
     load: Annotated[str | Stated, Entry(expected="a load, a number, or { value, unit }", example="FY")]
     seconds: Annotated[
-        float,
-        Unit("s", plain=True),
-        AtLeast(0),
-        Entry(expected="seconds, zero or more", example=30),
+        float, Unit("s", plain=True), AtLeast(0), Entry(expected="seconds, zero or more", example=30)
     ]
     value: Annotated[
         _ByIndication | tuple[Stated, ...] | Stated,
@@ -137,9 +134,7 @@ class BetweenRuns:
 
     zero: Annotated[float, AtLeast(0), Entry(expected="a standard deviation, zero or more", example=0)]
     gain: Annotated[
-        float,
-        AtLeast(0),
-        Entry(expected="a standard deviation at the largest load, zero or more", example=0),
+        float, AtLeast(0), Entry(expected="a standard deviation at the largest load, zero or more", example=0)
     ]
     unit: Annotated[str, Text(numbers="int"), Entry(expected="a unit of the load such as 'N'", example="N")]
 
@@ -169,10 +164,7 @@ class CellEntries:
         Entry("of one count", expected='a number above zero, or { value, unit = "mV/V" } of one count'),
     ] = None  # fmt: skip
     excitation: Annotated[
-        float | None,
-        Unit("V", plain=True),
-        Above(0),
-        Entry("of the bridge", expected="volts above zero"),
+        float | None, Unit("V", plain=True), Above(0), Entry("of the bridge", expected="volts above zero")
     ] = None
     shunt_expected: Annotated[Stated | None, Entry("the step that the shunt makes", expected=_PLAIN)] = None
     shunt_measured: Annotated[

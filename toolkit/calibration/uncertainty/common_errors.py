@@ -60,10 +60,7 @@ def indication_errors(record: CalibrationRecord, statements: Statements) -> tupl
     readings = 1 if record.zero == "included" else 2
     return tuple(
         IndicationError(
-            name=cell.name,
-            half_width=(cell.resolution or 0.0) / 2,
-            readings=readings,
-            u=cell.u or 0.0,
+            name=cell.name, half_width=(cell.resolution or 0.0) / 2, readings=readings, u=cell.u or 0.0
         )
         for cell in statements.cells
     )

@@ -3,13 +3,7 @@
 from __future__ import annotations
 
 from toolkit.characteristics.characteristic import CURVE_BUDGET, PULL_THESIS, Characteristic
-from toolkit.characteristics.reading import (
-    COVERS_ZERO,
-    CURVE_FY,
-    CURVE_MZ,
-    ZERO_OF_FY,
-    half_without_force,
-)
+from toolkit.characteristics.reading import COVERS_ZERO, CURVE_FY, CURVE_MZ, ZERO_OF_FY, half_without_force
 
 CHARACTERISTIC = Characteristic(
     name="thesis_PRAT_at_FY_zero",

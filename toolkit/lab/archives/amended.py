@@ -37,12 +37,7 @@ class Amended:
 
 
 def amend(
-    linked: Linked,
-    audited: ArchiveAudit,
-    target: Path,
-    basis: Basis,
-    *,
-    step: Callable[[str], None],
+    linked: Linked, audited: ArchiveAudit, target: Path, basis: Basis, *, step: Callable[[str], None]
 ) -> tuple[Amended, ...]:
     """Make the amended report of each report with a manifest that rests on another record than that in force.
 

@@ -52,8 +52,7 @@ class Headline:
     ] = 0
     stepping: Annotated[int, Entry("files with a force or cell that steps where nothing moved")] = 0
     copies: Annotated[
-        int,
-        Entry("files that a repair wrote: their agreement proves nothing", key="corrected_copies"),
+        int, Entry("files that a repair wrote: their agreement proves nothing", key="corrected_copies")
     ] = 0
     no_recording: Annotated[int, Entry("notes, lock files and the like")] = 0
     bare: Annotated[

@@ -25,14 +25,7 @@ from toolkit.days import parse_day
 from toolkit.declared import attempt, toml_text
 from toolkit.errors import ConfigError, OutputError, SessionError, ToolkitError
 from toolkit.files import toml_entries, write_atomic
-from toolkit.inputs import (
-    DATA_FILE,
-    SETTINGS_FILE,
-    check_size,
-    is_regular,
-    read_input,
-    read_regular,
-)
+from toolkit.inputs import DATA_FILE, SETTINGS_FILE, check_size, is_regular, read_input, read_regular
 from toolkit.lab.desk.uploads import FILE_NAME, claimed_folder
 from toolkit.lab.desk.versions import version_of
 from toolkit.publication import publication, settle

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from toolkit.errors import ConfigError, UnreadableError
+from toolkit.errors import ConfigError, ToolkitError, UnreadableError
 from toolkit.inputs import RESULT_FILE, read_input
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.home import PLAN, TEMPLATES
@@ -97,7 +97,6 @@ def titles_of(kept: KeptPlan) -> dict[str, str]:
 def fixtures_of(home: Path) -> dict[str, str]:
     """Return the loading fixtures of a home by id: those in it and in `FIXTURES` in it."""
     from toolkit.declared import read
-    from toolkit.errors import ToolkitError
     from toolkit.machine.hub import LoadingFixtures
 
     places = {}

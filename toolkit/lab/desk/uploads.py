@@ -45,8 +45,7 @@ def claimed_folder(parent: Path, word: str) -> str:
     try:
         parent.mkdir(exist_ok=True)
         number = max(
-            (int(match[1]) for path in parent.iterdir() if (match := pattern.match(path.name))),
-            default=0,
+            (int(match[1]) for path in parent.iterdir() if (match := pattern.match(path.name))), default=0
         )
         while True:
             number += 1

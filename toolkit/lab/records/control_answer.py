@@ -16,7 +16,7 @@ from toolkit.calibration.standards.e74 import E74Result
 from toolkit.calibration.standards.evaluation import COMBINED, Evaluation, Standard, evaluate_source
 from toolkit.calibration.standards.iso376 import Iso376Result
 from toolkit.declared.answers import entry_of
-from toolkit.errors import ConfigError, SessionError
+from toolkit.errors import ConfigError, SessionError, ToolkitError
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines, table
 
@@ -170,7 +170,6 @@ def due_answer(
         the one instrument that was named cannot be judged
     """
     from toolkit.calibration.control.recall import due_findings, due_of
-    from toolkit.errors import ToolkitError
 
     rows: list[DueInstrument] = []
     findings: list[Finding] = []
@@ -231,8 +230,6 @@ def _series(series: Series) -> ChartSeries:
 
 def evaluation_text(evaluation: Evaluation) -> str:
     """Return an evaluation by a standard for people."""
-    from toolkit.calibration.standards.e74 import E74Result
-
     title = "ASTM E74" if evaluation.standard == "e74" else "ISO 376"
     sense = {"up": ", increasing", "down": ", decreasing"}.get(evaluation.direction or "", "")
     lines = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
+from toolkit.calibration.control.as_found import AsFoundLoad
 from toolkit.declared.answers import entry_of
 from toolkit.lab.answers import table
 
@@ -60,21 +61,6 @@ class Responses(TypedDict):
     responses: list[Response]
 
 
-class FoundLoad(TypedDict):
-    """The errors of a session's rows by the record that was in force before it."""
-
-    load: str
-    unit: str
-    reference: Annotated[Sequence[float], "of each row"]
-    error: Annotated[Sequence[float], "fitted minus reference of each row"]
-    tolerance: float
-    full_scale: float
-    max_error: Annotated[float, "the largest one, with its sign"]
-    max_percent_fs: float
-    worst_row: Annotated[int, "from 1"]
-    within: bool
-
-
 class Found(TypedDict):
     """As found."""
 
@@ -83,7 +69,7 @@ class Found(TypedDict):
     record: Annotated[str | None, "in force before it"]
     within: bool | None
     reason: Annotated[str | None, "why nothing could be compared"]
-    loads: list[FoundLoad]
+    loads: Sequence[AsFoundLoad]
 
 
 class FullRecord(TypedDict):
@@ -245,9 +231,9 @@ def full_record(registry: Registry, record_id: str) -> tuple[FullRecord, str]:
         for row in compared["responses"]
     ]  # fmt: skip
     errors = [
-        [row["load"], _digits(row["max_error"]), _digits(row["tolerance"]), row["unit"],
-         "within" if row["within"] else "OUT"]
-        for row in (found or {"loads": []})["loads"]
+        [row.load, _digits(row.max_error), _digits(row.tolerance), row.unit,
+         "within" if row.within else "OUT"]
+        for row in (found["loads"] if found else ())
     ]  # fmt: skip
     before = compared["before"] or "-"
     text = "\n".join([

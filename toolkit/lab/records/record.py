@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, overload
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, RecordError
 from toolkit.lab.answers import counted
 from toolkit.lab.arguments import checked
 from toolkit.lab.faces import Face, Facts
@@ -213,7 +213,6 @@ class Record(Face):
     def _stored(self) -> tuple[Table, Table | None]:
         """Return the reference and check loads that the record was fitted to."""
         from toolkit.calibration.registry.stored import stored_check, stored_loads
-        from toolkit.errors import RecordError
 
         rows = stored_loads(self.registry.folder, self.result)
         if rows is None:

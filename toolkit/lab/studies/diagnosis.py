@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from toolkit.declared import Entry, answer
 from toolkit.declared.answers import extended
 from toolkit.diagnosis.answer.answer import Diagnosis
-from toolkit.lab.answers import (
-    DeliveredDocument,
-    Timing,
-    delivered_keys,
-    draft_keys,
-    finding_lines,
-    table,
-)
+from toolkit.lab.answers import DeliveredDocument, Timing, delivered_keys, draft_keys, finding_lines, table
 from toolkit.units import with_unit
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 
 from toolkit.calibration.records.use import UsedRecord
 from toolkit.comparison.laboratories import LaboratoryComparison
+from toolkit.comparison.model import Spread
 from toolkit.declared.answers import entry_of, merged
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import (
@@ -84,15 +85,6 @@ class FactorEntry(TypedDict):
     note: Annotated[str | None, "why it is not told apart"]
 
 
-class SpreadEntry(TypedDict):
-    """A standard deviation with its 95 % interval, in the unit of its quantity."""
-
-    value: float
-    dof: int
-    low: float
-    high: float
-
-
 class IntermediateEntry(TypedDict):
     """Intermediate precision with one factor different, ISO 5725-3."""
 
@@ -114,8 +106,8 @@ class PrecisionEntry(TypedDict):
     load_N: float
     n: int
     mean: float
-    s: SpreadEntry
-    repeatability_s_r: SpreadEntry | None
+    s: Spread
+    repeatability_s_r: Spread | None
     repeatability_limit_r: float | None
     intermediate: list[IntermediateEntry]
     farthest: Annotated[str, "test farthest from the mean"]
@@ -227,8 +219,7 @@ def _repeats(repeats: Repeats) -> RepeatsEntry:
 def _precision_entry(precision: Precision) -> PrecisionEntry:
     return entry_of(
         PrecisionEntry, precision, quantity=precision.name,
-        s=entry_of(SpreadEntry, precision.total),
-        repeatability_s_r=precision.repeatability and entry_of(SpreadEntry, precision.repeatability),
+        s=precision.total, repeatability_s_r=precision.repeatability,
         repeatability_limit_r=precision.limit_r,
         intermediate=[entry_of(IntermediateEntry, factor, s_I=factor.s) for factor in precision.factors],
         grubbs_p=precision.outlier_p, grubbs_p_holm=precision.outlier_p_holm,

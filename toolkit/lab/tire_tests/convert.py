@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.errors import ConfigError, FitError, refuse_unknown
+from toolkit.errors import ConfigError, FitError, OutputError, refuse_unknown
 from toolkit.files import same_file
 from toolkit.findings import Finding
 
@@ -99,9 +99,6 @@ def convert(
 
 
 def _kinds(source: Path, target: Path) -> tuple[str, str]:
-    from toolkit.errors import OutputError
-    from toolkit.files import same_file
-
     kinds = (_KINDS.get(source.suffix.lower(), ""), _KINDS.get(target.suffix.lower(), ""))
     if kinds not in _PAIRS:
         raise OutputError(
@@ -120,7 +117,6 @@ def _kinds(source: Path, target: Path) -> tuple[str, str]:
 def _refuse_draft(source: Path, target: Path, kinds: tuple[str, str], use: CalibrationUse | None) -> None:
     """Refuse a table of a draft: of a reduced test, or of a file that carries the mark of one."""
     from toolkit.calibration.records.use import DRAFT_MARK
-    from toolkit.errors import OutputError
     from toolkit.inputs import TYDEX_FILE, read_input
 
     draft = use is not None and use.draft
@@ -147,7 +143,6 @@ def _tir(source: Path) -> tuple[str, tuple[Finding, ...]]:
 
 def _read(source: Path, kind: str, axes: str) -> tuple[Columns, Axes, tuple[Finding, ...], tuple[str, ...]]:
     # Columns in their own units, the axes that they are in, what stays out, and the marks of records.
-    from toolkit.findings import Finding
     from toolkit.units import from_si, unit
 
     if kind == "tydex":
@@ -189,8 +184,6 @@ def _marks(tydex: Path) -> tuple[str, ...]:
 def _of_test(source: Path, resolved: Resolved) -> tuple[Columns, Axes, tuple[Finding, ...]]:
     import numpy as np
 
-    from toolkit.findings import Finding
-
     all_conditions = resolved.result.reduced.conditions
     use = resolved.result.reduced.calibration
     conditions = [condition for condition in all_conditions if condition.used]
@@ -222,7 +215,6 @@ def _written(
     import io
 
     from toolkit.channels import signs
-    from toolkit.findings import Finding
     from toolkit.tires.table import MARKS
     from toolkit.tires.tydex import NAMES, tydex_text
 

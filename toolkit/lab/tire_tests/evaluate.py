@@ -43,11 +43,7 @@ def evaluate_grid(
             *findings,
             Finding(rule="grid-columns", where=str(table.path), message=text, level="note"),
         )
-    values = {
-        "FX": turned.FX.tolist(),
-        "FY": turned.FY.tolist(),
-        "MZ": turned.MZ.tolist(),
-    }
+    values = {"FX": turned.FX.tolist(), "FY": turned.FY.tolist(), "MZ": turned.MZ.tolist()}
     return values, findings
 
 

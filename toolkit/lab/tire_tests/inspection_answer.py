@@ -278,10 +278,7 @@ def _calibration_lines(inspection: Inspection) -> list[str]:
     if withdrawn is not None:
         void = "void on every day" if withdrawn.void_always else f"void from {withdrawn.void_from}"
         lines += textwrap.wrap(
-            f"withdrawn, {void}: {withdrawn.reason}",
-            106,
-            initial_indent="    ",
-            subsequent_indent="      ",
+            f"withdrawn, {void}: {withdrawn.reason}", 106, initial_indent="    ", subsequent_indent="      "
         )
     if len(identified.segments) > 1:
         lines += [

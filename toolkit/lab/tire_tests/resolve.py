@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, RecordError
 from toolkit.lab.home import calibrations_folder
 
 if TYPE_CHECKING:
@@ -120,7 +120,6 @@ def _findings(use: CalibrationUse) -> list[Finding]:
 
 def _from_file(test: Path, registry: Registry, basis: Basis) -> Resolved:
     from toolkit.calibration.registry.standing import Reason, standing
-    from toolkit.errors import RecordError
     from toolkit.recording.marks import is_own_output
     from toolkit.recording.safe_open import gate
     from toolkit.reduction.cells import checked

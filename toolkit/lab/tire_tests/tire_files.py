@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from toolkit.errors import ConfigError
+from toolkit.errors import ConfigError, FitError
 from toolkit.files import same_file
 from toolkit.findings import Finding
 
@@ -68,7 +68,6 @@ def write_fit(
     FitError
         the data have one load: its change would be invented
     """
-    from toolkit.errors import FitError
     from toolkit.tires.global_data import what_varies
     from toolkit.tires.global_model import GlobalModel
     from toolkit.tires.models import find
@@ -172,7 +171,6 @@ def fit_test_tire(reduced: ReducedTest) -> HandedTire:
     import numpy as np
 
     from toolkit.characteristics.groups import group
-    from toolkit.errors import FitError
     from toolkit.reduction.averaging import free_radius_m
     from toolkit.tires.global_data import measured, what_varies
     from toolkit.tires.global_fit import fit_global

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -110,8 +110,6 @@ class TireFit(Face):
         }
 
     def _plots(self) -> Mapping[str, Plot]:
-        from dataclasses import replace
-
         from toolkit.report.test.models import fit_plots
 
         fitted = self.result

@@ -6,14 +6,12 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, TypedDict
 
-from toolkit.declared.answers import entry_of
 from toolkit.errors import RenderError
 from toolkit.lab.answers import table
-from toolkit.qualification.model import Check, NotCovered, QualificationRecord
+from toolkit.qualification.model import Check, QualificationRecord
 from toolkit.report.word.office import SOFFICE, find_soffice
 from toolkit.system import is_administrator
 
@@ -100,25 +98,6 @@ def _fonts() -> list[MachineNeed]:
         )
         for font in _FONTS
     ]
-
-
-class QualifyAnswer(TypedDict):
-    """What this installation computes, held against certified values."""
-
-    passed: bool
-    software: str
-    python: str
-    packages: Annotated[Mapping[str, str], "versions that change numbers"]
-    platform: str
-    date: str
-    numbers_sha256: str
-    checks: list[Check]
-    not_covered: list[NotCovered]
-
-
-def qualification_payload(record: QualificationRecord) -> QualifyAnswer:
-    """Return a qualification as the JSON answer."""
-    return entry_of(QualifyAnswer, record)
 
 
 def qualification_text(record: QualificationRecord) -> str:

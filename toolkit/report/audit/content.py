@@ -174,9 +174,7 @@ VALUES = (
     AUDIT.date("known_at", "day of knowledge", lambda summary, _: summary.view.made.known_at),
     AUDIT.number("files", "files of the archive", lambda summary, _: len(summary.view.made.files)),
     AUDIT.number(
-        "right",
-        "files whose Fy and Mz are those of the record in force",
-        lambda summary, _: summary.right,
+        "right", "files whose Fy and Mz are those of the record in force", lambda summary, _: summary.right
     ),
     AUDIT.number("not_right", "the other files that could be read", lambda summary, _: summary.wrong),
     AUDIT.number("unreadable", "files that could not be read", lambda summary, _: summary.unreadable),

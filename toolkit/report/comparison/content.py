@@ -156,9 +156,7 @@ DECLARED = (
     COMPARISON.text("title", "title", lambda source, _: source.title),
     COMPARISON.text("mode", "what the comparison is about", lambda source, _: source.mode),
     COMPARISON.text(
-        "reference",
-        "what all others are compared with",
-        lambda source, _: source.comparison.reference.label,
+        "reference", "what all others are compared with", lambda source, _: source.comparison.reference.label
     ),
     COMPARISON.text(
         "conclusion", "what was found, in numbers", lambda source, _: conclusion(source.comparison)

@@ -91,12 +91,7 @@ PLAN: Document[PlanSheet] = Document(
 def build_plan_content(sheet: PlanSheet, style: Style) -> ReportContent:
     """Return everything that a template of a plan's sheet can ask for."""
     return PLAN.content(
-        sheet,
-        style,
-        title=sheet.title,
-        identity=sheet.id,
-        subject=_SUBJECTS[sheet.kind],
-        issued=sheet.issued,
+        sheet, style, title=sheet.title, identity=sheet.id, subject=_SUBJECTS[sheet.kind], issued=sheet.issued
     )
 
 

@@ -141,11 +141,7 @@ def _budget(row: Row, style: Style) -> Cells:
     characteristic, sources = row.characteristic, dict(row.sources)
     unit, factor = style.unit(characteristic.printed_unit)
     factor *= characteristic.factor
-    cells: Cells = {
-        "quantity": characteristic.title,
-        "rotation": row.rotation,
-        "unit": printed(str(unit)),
-    }
+    cells: Cells = {"quantity": characteristic.title, "rotation": row.rotation, "unit": printed(str(unit))}
     total = math.hypot(*sources.values()) * factor
     for column in BUDGET:
         part = math.hypot(*(sources.get(name, 0.0) for name in column.sources)) * factor

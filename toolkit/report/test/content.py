@@ -226,9 +226,7 @@ CONDITIONS = (
     ),
     _when("reverse", "the test has reversed runs", _reverse),
     _when(
-        "stiffness",
-        "a cornering or aligning stiffness exists",
-        lambda report, _: _has_any(report, STIFFNESS),
+        "stiffness", "a cornering or aligning stiffness exists", lambda report, _: _has_any(report, STIFFNESS)
     ),
     _when("no_findings", "the test has no findings", lambda report, _: not report.findings),
     _mark("simulated", "if.simulated simulated", _simulated_mark),

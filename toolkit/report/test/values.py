@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from toolkit.characteristics.catalogue import summary
@@ -57,6 +57,10 @@ def _directions(t: ReportedTest, _style: Style) -> str:
     directions = [r for r in ("forward", "reverse") if any(c.rotation == r for c in t.used)]
     turned = "reverse" in directions and t.info.reversal == "tire"
     return " and ".join(directions) + (f", {TURNED}" if turned else "")
+
+
+def _pressure_times(factor: float) -> Callable[[ReportedTest, Style], float | None]:
+    return lambda t, _: _scaled(t.info.pressure_Pa, factor)
 
 
 def _axes(t: ReportedTest, _style: Style) -> str:
@@ -202,26 +206,9 @@ VALUES = (
     _date("test.date", "date of the test", lambda t, _: t.info.date),
     _date("report.date", "date of issue", lambda t, _: t.issued),
     _date("item.received", "date on which the item was received", lambda t, _: t.details.received),
-    _number(
-        "test.pressure.psi",
-        "test pressure",
-        lambda t, _: _scaled(t.info.pressure_Pa, 1 / _PSI),
-        unit="psi",
-        spec=".1f",
-    ),
-    _number(
-        "test.pressure.bar",
-        "test pressure",
-        lambda t, _: _scaled(t.info.pressure_Pa, 1e-5),
-        unit="bar",
-        spec=".2f",
-    ),
-    _number(
-        "test.pressure.kPa",
-        "test pressure",
-        lambda t, _: _scaled(t.info.pressure_Pa, 1e-3),
-        unit="kPa",
-        spec=".0f",
+    *(
+        _number(f"test.pressure.{unit}", "test pressure", _pressure_times(factor), unit=unit, spec=spec)
+        for unit, factor, spec in (("psi", 1 / _PSI, ".1f"), ("bar", 1e-5, ".2f"), ("kPa", 1e-3, ".0f"))
     ),
     _number(
         "test.speed",

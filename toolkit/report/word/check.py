@@ -17,14 +17,7 @@ from toolkit.report.tags import DRAWN, format_problem, parse_tag, width_emu
 from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.decimals import coarse_decimals
 from toolkit.report.word.fonts import missing_fonts, undrawn
-from toolkit.report.word.lint import (
-    RULES,
-    LintFinding,
-    at_element,
-    cut_in_two,
-    surroundings,
-    unprinted,
-)
+from toolkit.report.word.lint import RULES, LintFinding, at_element, cut_in_two, surroundings, unprinted
 from toolkit.report.word.look import LEAST_SIZE, must_be_read, unreadable
 from toolkit.report.word.package import Template, open_package
 from toolkit.report.word.pictures import letters_of
@@ -80,12 +73,7 @@ def check_template(
 
 
 def check_stories(
-    package: object,
-    parts: list[Story],
-    style: Style,
-    words: Vocabulary,
-    *,
-    fonts: bool,
+    package: object, parts: list[Story], style: Style, words: Vocabulary, *, fonts: bool
 ) -> tuple[LintFinding, ...]:
     """Return the findings of an opened package (see `check_template`)."""
     sites = scan(parts)

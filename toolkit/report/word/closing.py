@@ -6,17 +6,13 @@ the words before it stand.
 
 from __future__ import annotations
 
-import html
-import re
 from pathlib import Path
-
-from lxml import etree
 
 from toolkit.errors import RenderError
 from toolkit.report.content import ReportContent
-from toolkit.report.word.own import element, own_paragraph
-from toolkit.report.word.toc_pages import poppler
-from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, q
+from toolkit.report.word.own import own_paragraph
+from toolkit.report.word.preview import words_of
+from toolkit.report.word.xml import W_P, W_SDT, W_T, Element, element, q
 from toolkit.trust.seal.qr import Place
 
 LABEL = "Signature"
@@ -27,10 +23,6 @@ CAPTION = (
 SIZE = 170.0
 """Of the code's square, in points."""
 _SPACE, _GAP = 12.0, 4.0  # around the code, in points
-_WORD = re.compile(
-    r'<word xMin="([\d.-]+)" yMin="([\d.-]+)" xMax="([\d.-]+)" yMax="([\d.-]+)">([^<]*)</word>'
-)
-_PAGE = re.compile(r'<page width="([\d.]+)" height="([\d.]+)">')
 
 
 def close(body: Element, content: ReportContent, *, signed: bool) -> list[tuple[str, str]]:
@@ -55,23 +47,16 @@ def place_of_symbol(pdf: Path, page: int, content: ReportContent) -> Place:
     RenderError
         ``proof-place``: the page has no such place, or something stands there
     """
-    listing = poppler(["pdftotext", "-bbox", "-f", str(page), "-l", str(page), str(pdf), "-"])
-    rows = _WORD.findall(listing)
-    boxes, texts = [tuple(map(float, row[:4])) for row in rows], [html.unescape(row[4]) for row in rows]
-    caption = content.style.say(CAPTION).split()
-    size = _PAGE.search(listing)
+    width, height, words = next(iter(words_of(pdf, page=page)), (0.0, 0.0, []))
+    caption, texts = content.style.say(CAPTION).split(), [word[0] for word in words]
     at = next((at for at in reversed(range(len(texts))) if texts[at : at + len(caption)] == caption), None)
-    if at is None or size is None:
+    if at is None:
         raise _without("its words are not on the last page")
-    caption_boxes = boxes[at : at + len(caption)]
-    x, top = min(box[0] for box in caption_boxes), max(box[3] for box in caption_boxes) + _GAP
+    of_caption = words[at : at + len(caption)]
+    x, top = min(word[1] for word in of_caption), max(word[4] for word in of_caption) + _GAP
     right, bottom = x + SIZE, top + SIZE
-    inside = [
-        text
-        for text, (x0, y0, x1, y1) in zip(texts, boxes, strict=True)
-        if x0 < right and x1 > x and y0 < bottom and y1 > top
-    ]
-    if inside or bottom > float(size[2]) or right > float(size[1]):
+    inside = [text for text, x0, y0, x1, y1 in words if x0 < right and x1 > x and y0 < bottom and y1 > top]
+    if inside or bottom > height or right > width:
         raise _without(f"{' '.join(inside[:5])!r} stands there" if inside else "the page ends there")
     return Place(page=page - 1, left=x, top=top, size=SIZE)
 
@@ -95,13 +80,8 @@ def _paragraph(text: str) -> Element:
 
 
 def _space() -> Element:
-    paragraph = etree.Element(W_P)
-    properties = etree.SubElement(paragraph, q("w:pPr"))
-    etree.SubElement(properties, q("w:keepNext"))
-    spacing = etree.SubElement(properties, q("w:spacing"))
-    spacing.set(q("w:line"), str(round(20 * (SIZE + _SPACE))))
-    spacing.set(q("w:lineRule"), "exact")
-    return paragraph
+    spacing = element("w:spacing", line=round(20 * (SIZE + _SPACE)), lineRule="exact")
+    return element("w:p", element("w:pPr", element("w:keepNext"), spacing))
 
 
 def _without(got: str) -> RenderError:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from lxml import etree
 
-from toolkit.report.word.xml import FALLBACK, W_P, W_R, W_T, Element, paragraph_text, q
+from toolkit.report.word.xml import FALLBACK, W_P, W_R, W_T, Element, field_mark, paragraph_text, q
 
 
 @dataclass(slots=True, eq=False)
@@ -54,9 +54,7 @@ def _write(field: _Field, text: str) -> None:
         return
     owner = field.end.getparent()
     if field.separate is None:
-        run = etree.Element(W_R)
-        etree.SubElement(run, q("w:fldChar")).set(q("w:fldCharType"), "separate")
-        owner.addprevious(run)
+        owner.addprevious(field_mark("separate"))
     run = etree.Element(W_R)
     etree.SubElement(run, W_T).text = text
     owner.addprevious(run)

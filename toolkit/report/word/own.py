@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from lxml import etree
-
-from toolkit.report.word.xml import W_P, Element, new_run, q
+from toolkit.report.word.xml import Element, element, new_run
 
 BLACK, RED, _WHITE = "000000", "B00000", "FFFFFF"
 _TEXT = 20  # half-points
@@ -35,38 +33,31 @@ def own_paragraph(
     before : space above it, in twips
     first, last : further properties of the paragraph, before its shading and behind its indentation
     """
-    paragraph = etree.Element(W_P)
-    properties = etree.SubElement(paragraph, q("w:pPr"))
-    properties.extend(first)
-    # In the sequence of the schema.
-    properties.append(element("w:shd", val="clear", color="auto", fill=_WHITE))
-    properties.append(element("w:suppressAutoHyphens"))
-    properties.append(element("w:bidi", val=0))
-    properties.append(element("w:spacing", before=before, after=0, line=240, lineRule="auto"))
-    properties.append(element("w:ind", left=0, right=0, firstLine=0))
-    properties.extend(last)
-    paragraph.append(new_run(text, _look(bold=bold, colour=colour, half_points=half_points)))
-    return paragraph
-
-
-def element(name: str, **values: str | int) -> Element:
-    """Return an element with attributes, all of WordprocessingML."""
-    written = etree.Element(q(name))
-    for key, value in values.items():
-        written.set(q(f"w:{key}"), str(value))
-    return written
+    properties = element(
+        "w:pPr",
+        *first,
+        # In the sequence of the schema.
+        element("w:shd", val="clear", color="auto", fill=_WHITE),
+        element("w:suppressAutoHyphens"),
+        element("w:bidi", val=0),
+        element("w:spacing", before=before, after=0, line=240, lineRule="auto"),
+        element("w:ind", left=0, right=0, firstLine=0),
+        *last,
+    )
+    return element("w:p", properties, new_run(text, _look(bold=bold, colour=colour, half_points=half_points)))
 
 
 def _look(*, bold: bool, colour: str, half_points: int) -> Element:
-    look = etree.Element(q("w:rPr"))
-    look.append(element("w:b", val=int(bold)))
-    look.extend(element(f"w:{off}", val=0) for off in _OFF)
-    for name, value in (
+    stated = (
         ("w:color", colour), ("w:spacing", 0), ("w:w", 100), ("w:position", 0), ("w:sz", half_points),
         ("w:szCs", half_points), ("w:highlight", "none"), ("w:u", "none"), ("w:effect", "none"),
-    ):  # fmt: skip
-        look.append(element(name, val=value))
-    look.append(element("w:shd", val="clear", color="auto", fill=_WHITE))
-    look.append(element("w:vertAlign", val="baseline"))
-    look.append(element("w:specVanish", val=0))
-    return look
+    )  # fmt: skip
+    return element(
+        "w:rPr",
+        element("w:b", val=int(bold)),
+        *(element(f"w:{off}", val=0) for off in _OFF),
+        *(element(name, val=value) for name, value in stated),
+        element("w:shd", val="clear", color="auto", fill=_WHITE),
+        element("w:vertAlign", val="baseline"),
+        element("w:specVanish", val=0),
+    )

@@ -109,7 +109,6 @@ def open_package(template: Template) -> Any:
         a part is missing that another one refers to, or the package cannot be put together
     """
     from docx.package import Package
-    from lxml import etree
 
     try:
         return Package.open(io.BytesIO(template.data))

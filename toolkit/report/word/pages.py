@@ -12,9 +12,9 @@ from lxml import etree
 from toolkit.calibration.records.use import DRAFT
 from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
-from toolkit.report.word.own import RED, element, own_paragraph
+from toolkit.report.word.own import RED, own_paragraph
 from toolkit.report.word.scan import LITERAL, visible_texts
-from toolkit.report.word.xml import W_P, Element, Story, clean, in_fallback, q
+from toolkit.report.word.xml import W_P, Element, Story, clean, element, in_fallback, q
 from toolkit.version import __version__
 
 _NOTES = ("footnote", "endnote")

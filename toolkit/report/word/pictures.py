@@ -25,20 +25,7 @@ from toolkit.report.word.chart import (
 from toolkit.report.word.controls import P_PR
 from toolkit.report.word.scan import own_rows
 from toolkit.report.word.styles import paragraph_styles
-from toolkit.report.word.xml import (
-    NS,
-    W_P,
-    W_R,
-    W_T,
-    W_TBL,
-    W_TC,
-    W_TR,
-    Element,
-    Story,
-    ancestor,
-    clean,
-    q,
-)
+from toolkit.report.word.xml import NS, W_P, W_R, W_T, W_TBL, W_TC, W_TR, Element, Story, ancestor, clean, q
 
 EMU_TWIP, EMU_INCH = 635, 914400
 _VML_EMU = {"pt": 12700, "in": 914400, "cm": 360000, "mm": 36000, "px": 9525}

@@ -50,15 +50,20 @@ def pages_of(pdf: Path, mark: str) -> tuple[SeenPage, ...]:
     )
 
 
-def words_of(pdf: Path, *, raw: bool = False) -> list[tuple[float, float, list[Word]]]:
+def words_of(
+    pdf: Path, *, raw: bool = False, page: int | None = None
+) -> list[tuple[float, float, list[Word]]]:
     """Return the pages of a PDF: width, height [pt] and words; ``raw``: in the order of the print.
+
+    ``page`` is the only one that is asked for, from 1.
 
     Raises
     ------
     RenderError
         poppler is not installed, or does not end
     """
-    listing = poppler(["pdftotext", *(["-raw"] if raw else []), "-bbox", str(pdf), "-"])
+    only = [] if page is None else ["-f", str(page), "-l", str(page)]
+    listing = poppler(["pdftotext", *(["-raw"] if raw else []), "-bbox", *only, str(pdf), "-"])
     return [
         (
             float(width),

@@ -13,19 +13,17 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
-from lxml import etree
-
 from toolkit.report.word.numbering import StyleSheet, headings, style_of
 from toolkit.report.word.xml import (
     W_P,
-    W_R,
-    W_T,
-    XML_SPACE,
     Element,
     ancestor,
+    element,
+    field_mark,
     in_fallback,
     paragraph_text,
     q,
+    text_run,
 )
 
 _CHAR, _INSTR, _TYPE = q("w:fldChar"), q("w:instrText"), q("w:fldCharType")
@@ -80,19 +78,19 @@ def contents_fields(root: Element) -> list[ContentsField]:
     """Return the TOC fields of a body, in their order."""
     fields: list[ContentsField] = []
     stack: list[list[Any]] = []
-    for element in root.iter(_CHAR, _INSTR):
-        kind = element.get(_TYPE)
-        if element.tag == _INSTR:
+    for mark in root.iter(_CHAR, _INSTR):
+        kind = mark.get(_TYPE)
+        if mark.tag == _INSTR:
             if stack and stack[-1][2] is None:
-                stack[-1][1] += element.text or ""
+                stack[-1][1] += mark.text or ""
         elif kind == "begin":
-            stack.append([element, "", None])
+            stack.append([mark, "", None])
         elif kind == "separate" and stack:
-            stack[-1][2] = element
+            stack[-1][2] = mark
         elif kind == "end" and stack:
             begin, code, separate = stack.pop()
             if code.split()[:1] and code.split()[0].upper() == "TOC":
-                fields.append(ContentsField(code=code, begin=begin, separate=separate, end=element))
+                fields.append(ContentsField(code=code, begin=begin, separate=separate, end=mark))
     return fields
 
 
@@ -173,12 +171,9 @@ class _Bookmarks:
             if candidate not in self.names
         )
         identity = str(next(self.ids))
-        start, end = etree.Element(q("w:bookmarkStart")), etree.Element(q("w:bookmarkEnd"))
-        start.set(q("w:id"), identity)
-        start.set(q("w:name"), name)
-        end.set(q("w:id"), identity)
+        start = element("w:bookmarkStart", id=identity, name=name)
         paragraph.insert(1 if paragraph.find(_P_PR) is not None else 0, start)
-        paragraph.append(end)
+        paragraph.append(element("w:bookmarkEnd", id=identity))
         return name
 
 
@@ -259,12 +254,12 @@ def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleShe
         _line(entry, patterns, sheet, width, linked, separator[1] if separator else "\t") for entry in entries
     ]
     if not paragraphs:
-        paragraphs = [etree.Element(W_P)]
-    head = [*before, _mark("begin"), _text(field.code, _INSTR), _mark("separate")]
+        paragraphs = [element("w:p")]
+    head = [*before, field_mark("begin"), text_run(field.code, _INSTR), field_mark("separate")]
     at = 1 if paragraphs[0].find(_P_PR) is not None else 0
     for offset, run in enumerate(head):
         paragraphs[0].insert(at + offset, run)
-    paragraphs[-1].append(_mark("end"))
+    paragraphs[-1].append(field_mark("end"))
     for paragraph in paragraphs:
         first.addprevious(paragraph)
     for paragraph in old:
@@ -306,46 +301,36 @@ def _line(
     linked: bool,
     separator: str,
 ) -> Element:
-    paragraph = etree.Element(W_P)
     style = sheet.identity(f"toc {entry.level}" if entry.heading else "table of figures")
-    properties = etree.Element(_P_PR)
+    properties = element("w:pPr")
     if style is not None and style in patterns:
         properties = deepcopy(patterns[style])
         for section in properties.findall(q("w:sectPr")):
             properties.remove(section)
     elif style is not None:
-        etree.SubElement(properties, q("w:pStyle")).set(q("w:val"), style)
+        properties.append(element("w:pStyle", val=style))
     elif entry.level > 1:
-        etree.SubElement(properties, q("w:ind")).set(q("w:left"), str(_INDENT * (entry.level - 1)))
+        properties.append(element("w:ind", left=_INDENT * (entry.level - 1)))
     if style not in sheet.tabbed and properties.find(q("w:tabs")) is None:
         _right_tab(properties, width)
-    paragraph.append(properties)
-    holder = paragraph
-    if linked:
-        holder = etree.SubElement(paragraph, q("w:hyperlink"))
-        holder.set(q("w:anchor"), entry.bookmark)
-        holder.set(q("w:history"), "1")
-    holder.append(_text(entry.text))
+    runs = [text_run(entry.text)]
     if entry.paged:
-        holder.append(_tab() if separator == "\t" else _text(separator))
-        holder.extend(
-            [
-                _mark("begin"),
-                _text(f" PAGEREF {entry.bookmark} \\h ", _INSTR),
-                _mark("separate"),
-                _text("1"),
-                _mark("end"),
-            ]
-        )
-    return paragraph
+        runs += [
+            element("w:r", element("w:tab")) if separator == "\t" else text_run(separator),
+            field_mark("begin"),
+            text_run(f" PAGEREF {entry.bookmark} \\h ", _INSTR),
+            field_mark("separate"),
+            text_run("1"),
+            field_mark("end"),
+        ]
+    if linked:
+        runs = [element("w:hyperlink", *runs, anchor=entry.bookmark, history=1)]
+    return element("w:p", properties, *runs)
 
 
 def _right_tab(properties: Element, width: int) -> None:
     """Put a tab stop with leading dots at the right edge; the schema wants it before the spacing."""
-    tabs = etree.Element(q("w:tabs"))
-    stop = etree.SubElement(tabs, q("w:tab"))
-    for name, value in (("val", "right"), ("leader", "dot"), ("pos", str(width))):
-        stop.set(q(f"w:{name}"), value)
+    tabs = element("w:tabs", element("w:tab", val="right", leader="dot", pos=width))
     before = {q(f"w:{element_name}") for element_name in _BEFORE_TABS.split()}
     properties.insert(sum(1 for child in properties if child.tag in before), tabs)
 
@@ -355,23 +340,3 @@ def _text_width(root: Element) -> int:
 
     sections = list(root.iter(q("w:sectPr")))
     return section_room(sections[0])[0] if sections else 9000
-
-
-def _mark(kind: str) -> Element:
-    run = etree.Element(W_R)
-    etree.SubElement(run, _CHAR).set(_TYPE, kind)
-    return run
-
-
-def _text(text: str, kind: str = W_T) -> Element:
-    run = etree.Element(W_R)
-    content = etree.SubElement(run, kind)
-    content.text = text
-    content.set(XML_SPACE, "preserve")
-    return run
-
-
-def _tab() -> Element:
-    run = etree.Element(W_R)
-    etree.SubElement(run, q("w:tab"))
-    return run

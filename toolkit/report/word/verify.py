@@ -60,9 +60,7 @@ def text_checks(text: str, filled: Filled) -> list[Check]:
             lost.append(f"{entry.tag} {entry.text[:40]!r}")
     checks = [
         Check(
-            name="values",
-            ok=not lost,
-            message="; ".join(lost[:5]) or f"{len(shown)} values found in the PDF",
+            name="values", ok=not lost, message="; ".join(lost[:5]) or f"{len(shown)} values found in the PDF"
         ),
         *_required(filled, hidden),
         Check(name="literals", ok=not unfilled, message=", ".join(unfilled[:5]) or "no tag is printed"),

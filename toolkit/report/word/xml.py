@@ -48,6 +48,25 @@ def parser() -> etree.XMLParser:
     return etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
 
 
+def element(name: str, /, *inner: Element, **values: str | int) -> Element:
+    """Return an element with others inside and with attributes, all of WordprocessingML."""
+    written = etree.Element(q(name), {q(f"w:{key}"): str(value) for key, value in values.items()})
+    written.extend(inner)
+    return written
+
+
+def field_mark(kind: str) -> Element:
+    """Return a run with a mark of a field: ``begin``, ``separate`` or ``end``."""
+    return element("w:r", element("w:fldChar", fldCharType=kind))
+
+
+def text_run(text: str, kind: str = W_T) -> Element:
+    """Return a run of text as it is, spaces at its ends too; ``kind`` a text's, or a field's code."""
+    content = etree.Element(kind, {XML_SPACE: "preserve"})
+    content.text = text
+    return element("w:r", content)
+
+
 @dataclass(slots=True, kw_only=True)
 class Story:
     """A part that holds text: body, header, footer, footnotes or endnotes.
