@@ -1,10 +1,12 @@
 """What of a budget hangs on the slip angles, for many designs at once: what an exchange goes by.
 
 A reading moves with the parameters of its curves by a gradient g, and these with the conditions by J^+, so
-that conditions of variances s² leave (g J^+)² s² of it (`characteristics.reading`). All else in the budget,
-what all rows share, stays as it is whatever the slip angles. The gradient is taken by moving a curve's
-parameters and letting the catalogue read again: no formula of a characteristic stands here. A design that
-comes out of the exchange is judged by the whole budget (`expectation`), not by this.
+that conditions of variances s² leave (g J^+)² s² of it (`characteristics.reading`). What the form of the
+curves misses at a slip angle moves the conditions of both sides and directions together: it adds up before it
+is squared, and where slip angles are chosen in pairs it cancels in what is read at zero. All else in the
+budget, what all rows share, stays as it is whatever the slip angles. The gradient is taken by moving a
+curve's parameters and letting the catalogue read again: no formula of a characteristic stands here. A design
+that comes out of the exchange is judged by the whole budget (`expectation`), not by this.
 
 Derivatives hold near the curves of the earlier test. A design that leaves a curve open between its slip
 angles is none, however well it tells what is demanded: the curve of the test may go elsewhere there, and
@@ -48,13 +50,19 @@ class Screen:
     """Demands on the curves of a list of candidate slip angles.
 
     ``tangents`` (curves, candidates, parameters), scaled, and ``variances`` (curves, candidates) of their
-    conditions; ``closed`` (curves, candidates) the variances of a curve that no slip angle leaves open;
+    conditions; ``forms`` (sources, curves, candidates) the standard deviations of what their form misses, one
+    error at all candidates of one of ``places`` (candidates,); ``own`` (readings, curves, candidates) marks
+    where a reading is the tire's value there; ``closed`` (curves, candidates) the variances of a curve that
+    no slip angle leaves open;
     ``gradients`` (readings, curves, parameters) in the same scale; ``fixed`` (readings,) the
     variances that stay, ``limits`` (readings,) of the expanded uncertainty.
     """
 
     tangents: Array
     variances: Array
+    forms: Array
+    places: NDArray[np.intp]
+    own: Array
     closed: Array
     gradients: Array
     fixed: Array
@@ -70,6 +78,10 @@ class Screen:
 
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
+        missed = weights - np.moveaxis(self.own[:, :, designs], 2, 0)
+        missed = np.einsum("drcn,scdn->drsn", missed, self.forms[:, :, designs])
+        places = self.places[designs]
+        own += np.einsum("drsn,dnm,drsm->dr", missed, places[:, :, None] == places[:, None], missed)
         curves = _between(self.tangents, pseudo, self.variances[:, designs]) / self.closed
         return _COVERAGE * np.sqrt(self.fixed + own) / self.limits, np.sqrt(curves.max(axis=2)) / _OPEN
 
@@ -102,7 +114,7 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
     """
     directions, scatter = earlier.foreseen(full)
     places: dict[tuple[float, str, str], int] = {}
-    tangents, variances, scales = [], [], []
+    tangents, variances, scales, forms = [], [], [], []
     for direction in directions:
         for channel in CHANNELS:
             fit = _fit(direction, channel)
@@ -114,19 +126,28 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
             tangents.append(jacobian * scale)
             scales.append(scale)
             variances.append(direction.group.own_u(channel) ** 2 + scatter.each(direction, channel))
+            forms.append(scatter.forms(direction, channel))
     gradients = np.zeros((len(reaches), len(tangents), len(scales[0])))
+    read = np.zeros((len(reaches), len(tangents), len(full.slip_angles_rad)))
     for row, reach in enumerate(reaches):
         demand = reach.demand
         for curve, gradient in _gradients(
             earlier, full.slip_angles_rad, demand.characteristic, reach.load_N, reach.rotation, reach.SA_rad
         ):
             gradients[row, places[curve]] = gradient * scales[places[curve]]
+        if reach.SA_rad is not None:
+            at_load = earlier.curves[reach.load_N, "forward"].fit.load_N
+            curve = at_load, reach.rotation, by_name()[demand.characteristic].channel
+            read[row, places[curve]] = np.isclose(np.sort(full.slip_angles_rad), reach.SA_rad)
     fixed = [sum(u * u for source, u in reach.sources if source not in _OWN) for reach in reaches]
     every, own = np.array(tangents), np.array(variances)
     pseudo = np.asarray(np.linalg.pinv(every, rcond=_NO_DATA), dtype=np.float64)
     return Screen(
         tangents=every,
         variances=own,
+        forms=np.stack(forms, axis=1),
+        places=np.unique(np.abs(np.round(full.slip_angles_rad, 9)), return_inverse=True)[1].ravel(),
+        own=read,
         closed=np.maximum(own, _between(every, pseudo[:, None], own[:, None])[0]),
         gradients=gradients,
         fixed=np.array(fixed),
