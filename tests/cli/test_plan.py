@@ -237,6 +237,10 @@ def test_what_is_shorter_than_a_row_is_refused_with_the_rate_that_parts_it_and_p
     assert "a row every" in " ".join(said["steps"])
     t = [float(row.split(",")[0]) for row in (tmp_path / "n" / "next.csv").read_text().splitlines()[1:]]
     assert min(b - a for a, b in itertools.pairwise(t)) >= (1 - 1e-6) / float(rate[1])
+    seldom = run(
+        "plan", "next", left_open(tmp_path / "c", recording='sample_rate = { value = 20, unit = "Hz" }\n')
+    )
+    assert "CASE.toml" in str(seldom.exception.where)
 
 
 def test_another_case_than_the_answers_is_refused(run, diagnosed, tmp_path):

@@ -36,7 +36,8 @@ _PEAK_SHARE = 0.99
 _SAME_RAD = 1e-9
 _BEYOND = 1e3  # what a design that goes beyond its limits pays for as much again
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
-_NEAR = 24  # designs that are judged by the whole budget: those that the exchange met and that screen best
+_NEAR = 8  # designs that are judged by the whole budget: those that the exchange met and that screen best
+_FAR = 1.2  # of a limit: a design beyond it stands for all that screen no better
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
 _ALIKE = 1.05
 
@@ -266,7 +267,9 @@ class ProtocolSearch:
             if judged.feasible:
                 return points
             distances.append(judged.distance)
-        return designs[min(range(len(designs)), key=distances.__getitem__)]
+            if judged.distance > (0.0, _FAR):
+                break
+        return designs[min(range(len(distances)), key=distances.__getitem__)]
 
     def _drawn(self, size: int) -> Iterator[Points]:
         """Yield designs of a size drawn at random, the same for the same size."""

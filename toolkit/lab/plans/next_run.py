@@ -48,6 +48,7 @@ class PlanNextAnswer(NextRunPlan):
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
+_SLACK = 1e-3  # of a rate: times of rows are printed
 _PLAIN, _APART = re.compile(r"[A-Za-z0-9_]{1,40}"), "_apart"
 
 
@@ -208,7 +209,7 @@ def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits
 
 
 def _least_step(sample_rate_Hz: float | None, problem: Problem) -> float:
-    """Return the least time from row to row [s] that can be recorded; infinite where nothing is said of it.
+    """Return the least time from row to row [s] that can be recorded: as it was, where nothing is said of it.
 
     Raises
     ------
@@ -220,20 +221,16 @@ def _least_step(sample_rate_Hz: float | None, problem: Problem) -> float:
 
     case = problem.case
     stated = case.sample_rate_Hz if sample_rate_Hz is None else sample_rate_Hz
-    if stated is None and case.simulation.kind == "machine":
-        stated = load_machine(case.simulation.machine).sample_rate_Hz
-    if stated is None or not case.has_time:
-        if sample_rate_Hz is None:
-            return math.inf
+    where = str(case.path) if sample_rate_Hz is None else "--sample-rate"
+    recorded = 1 / min(row_step(run) for run in problem.runs) if case.has_time else math.inf
+    if stated is None:
+        machine = load_machine(case.simulation.machine) if case.simulation.kind == "machine" else None
+        return 1 / ((machine and machine.sample_rate_Hz) or recorded)
+    if not stated >= recorded * (1 - _SLACK):
         raise _wrong(
-            "rows without a time have no rate", "--sample-rate", f"{sample_rate_Hz:g} Hz",
-            "a case with a channel of the role time", "leave --sample-rate out",
-        )  # fmt: skip
-    recorded = 1 / min(row_step(run) for run in problem.runs)
-    if sample_rate_Hz is not None and sample_rate_Hz < recorded * (1 - 1e-6):
-        raise _wrong(
-            "fewer rows a second than were recorded", "--sample-rate", f"{sample_rate_Hz:g} Hz",
-            f"{recorded:.4g} Hz at least, as the recordings have it", "leave --sample-rate out",
+            "rows cannot be recorded so seldom", where, f"sample rate {stated:g} Hz",
+            f"{recorded:.6g} Hz at least, as recorded" if case.has_time else "a case with a time",
+            "leave the sample rate out, or state what can be recorded",
         )  # fmt: skip
     return 1 / stated
 
