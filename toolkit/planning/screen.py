@@ -2,15 +2,13 @@
 
 A reading moves with the parameters of its curves by a gradient g, and these with the conditions by J^+, so
 that conditions of variances s² leave (g J^+)² s² of it (`characteristics.reading`). What the form of the
-curves misses at a slip angle moves the conditions of both sides and directions together: it adds up before it
-is squared, and where slip angles are chosen in pairs it cancels in what is read at zero. All else in the
-budget, what all rows share, stays as it is whatever the slip angles. The gradient is taken by moving a
-curve's parameters and letting the catalogue read again: no formula of a characteristic stands here. A design
-that comes out of the exchange is judged by the whole budget (`expectation`), not by this.
+curves misses at a slip angle moves both sides and directions together: it adds up before it is squared. All
+else in the budget stays as it is whatever the slip angles. The gradient is taken by moving a curve's
+parameters and letting the catalogue read again: no formula of a characteristic stands here. A design that
+comes out of the exchange is judged by the whole budget (`expectation`), not by this.
 
 Derivatives hold near the curves of the earlier test. A design that leaves a curve open between its slip
-angles is none, however well it tells what is demanded: the curve of the test may go elsewhere there, and
-what is read off it has another U.
+angles is none: the curve of the test may go elsewhere there, and what is read off it has another U.
 """
 
 from __future__ import annotations
@@ -40,9 +38,7 @@ _STEP = 1e-4  # of a parameter's size
 _NO_DATA = 1e-8
 _COVERAGE = 1.96
 _POWER = 16
-# The standard uncertainty of a curve, anywhere in its range, at most: in that of a condition there, or of
-# what the design of every candidate leaves there, which no other design makes smaller.
-_OPEN = 2.0
+_OPEN = 2.0  # u of a curve at most, in that of a condition there, or of what every candidate together leaves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,10 +48,9 @@ class Screen:
     ``tangents`` (curves, candidates, parameters), scaled, and ``variances`` (curves, candidates) of their
     conditions; ``forms`` (sources, curves, candidates) the standard deviations of what their form misses, one
     error at all candidates of one of ``places`` (candidates,); ``own`` (readings, curves, candidates) marks
-    where a reading is the tire's value there; ``closed`` (curves, candidates) the variances of a curve that
-    no slip angle leaves open;
-    ``gradients`` (readings, curves, parameters) in the same scale; ``fixed`` (readings,) the
-    variances that stay, ``limits`` (readings,) of the expanded uncertainty.
+    where a reading is the tire's value; ``closed`` (curves, candidates) the variances of a curve that nothing
+    leaves open; ``gradients`` (readings, curves, parameters) in the scale of the tangents; ``fixed``
+    (readings,) the variances that stay, ``limits`` (readings,) of the expanded uncertainty.
     """
 
     tangents: Array
@@ -69,13 +64,10 @@ class Screen:
     limits: Array
 
     def ratios(self, designs: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return U of each reading over its limit (designs, readings), and how open each curve is between
-        its slip angles over what is allowed (designs, curves).
-
-        ``designs`` (designs, points) are candidates by their numbers.
+        """Return of designs (designs, points), candidates by their numbers, U of each reading over its limit
+        (designs, readings), and how open each curve is between over what is allowed (designs, curves).
         """
         pseudo = np.asarray(np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA), dtype=np.float64)
-
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
         missed = weights - np.moveaxis(self.own[:, :, designs], 2, 0)
@@ -202,12 +194,7 @@ def _gradients(
                     values = list(fit.parameters)
                     values[i] = dataclasses.replace(parameter, value=parameter.value + sign * step)
                     changed = dataclasses.replace(fit, parameters=tuple(values))
-                    moved = (
-                        dataclasses.replace(direction.fit, FY=changed)
-                        if channel == "FY"
-                        else dataclasses.replace(direction.fit, MZ=changed)
-                    )
-                    ends.append(value(place, moved))
+                    ends.append(value(place, dataclasses.replace(direction.fit, **{channel: changed})))
                 slopes.append((ends[0] - ends[1]) / (2 * step))
             found.append(((direction.group.load_N, direction.group.rotation, channel), np.array(slopes)))
     return tuple(found)
