@@ -13,11 +13,10 @@ angles is none: the curve of the test may go elsewhere there, and what is read o
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,7 +172,7 @@ def _gradients(
     directions: dict[str, Direction] = {each.group.rotation: each for each in earlier.directions(design)}
     at = () if SA_rad is None else (SA_rad,)
     # Of the value alone: what the rows share is not asked for.
-    shared = dataclasses.replace(earlier.shared, record=None)
+    shared = replace(earlier.shared, record=None)
     still = [Reader(directions[run], shared=shared, stepped=False) for run in runs]
 
     def value(place: int, fit: DirectionFit) -> float:
@@ -183,18 +182,18 @@ def _gradients(
 
     found = []
     for place, reader in enumerate(still):
-        direction = reader.direction
+        direction, curves = reader.direction, reader.direction.fit
         for channel in CHANNELS:
-            fit = _fit(direction, channel)
-            slopes = []
+            fit, slopes = _fit(direction, channel), []
             for i, parameter in enumerate(fit.parameters):
                 step = _STEP * max(abs(parameter.value), 1e-3)
                 ends = []
                 for sign in (1.0, -1.0):
                     values = list(fit.parameters)
-                    values[i] = dataclasses.replace(parameter, value=parameter.value + sign * step)
-                    changed = dataclasses.replace(fit, parameters=tuple(values))
-                    ends.append(value(place, dataclasses.replace(direction.fit, **{channel: changed})))
+                    values[i] = replace(parameter, value=parameter.value + sign * step)
+                    changed = replace(fit, parameters=tuple(values))
+                    moved = replace(curves, FY=changed) if channel == "FY" else replace(curves, MZ=changed)
+                    ends.append(value(place, moved))
                 slopes.append((ends[0] - ends[1]) / (2 * step))
             found.append(((direction.group.load_N, direction.group.rotation, channel), np.array(slopes)))
     return tuple(found)
