@@ -1,14 +1,17 @@
 """The classes that sealed batches left: does one proposed run name the right member?
 
-    python -m tests.campaigns.sealed_classes [--batches 0..6] [--minutes 30] [--cases 100] [--seed 27]
+    python -m tests.campaigns.sealed_classes [--drawn SEED] [--minutes 30] [--cases 100] [--seed 27]
 
 A sealed batch of the proof (`proof/*.jsonl.gz`) keeps what the tool answered to each case, and the seed that
 draws the case again. A case counts where the answer has a class that holds a true effect, and where what is
 drawn again is what was sealed. `plan next` proposes a run; beside it stand a random change within the same
 limits and a repeat. The generator's truth answers each, later than all recordings, with noise of its own;
 then the members are fitted to all recordings, each from where it was. Named is the one that is ahead of all
-others by what a diagnosis asks for. `--batches` says which, the newest is 0; classes of one batch come in
-their order, those of several in a drawn one.
+others by what a diagnosis asks for. The newest batch comes first.
+
+`--drawn` takes no batch: cases with a delay or a lag are drawn anew by the proof's generator, in turn of its
+families (`FAMILIES`). One counts where the generator itself finds others within its noise of the effect
+(`alike`), and is twice as far from none, and where the recordings name none.
 
 Runs are planned within limits as a laboratory would know them of its machine.
 They were fixed before any outcome by them was seen, with these reasons:
@@ -17,6 +20,8 @@ They were fixed before any outcome by them was seen, with these reasons:
   its machine. What was never below zero (a heater's power, a valve's flow, the load of a wheel) stays so;
 - it goes at most three times as fast as recorded, and the channel of its rate as far;
 - a chamber or a bath (`T`, `TA`) is set within 15 K of the middle of what was recorded, three times as fast;
+- rows are recorded up to sixteen times as dense: what is kept of a converter's thousand samples a second is
+  a choice of the file;
 - the drum's speed stays as recorded: the shafts' angles, which are recorded beside it, go with it.
 
 Left out, and counted: classes that no run of such a plan can ask about (`outside`).
@@ -27,19 +32,20 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import functools
+import itertools
 import json
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from proof import draw, process_noise, proof_file
+from proof import catalogue, draw, process_noise, proof_file
 from proof import model as generated
 from proof.files import write_case
 from tests.coverage.rows import exact_interval
@@ -53,7 +59,7 @@ from toolkit.diagnosis.search.between_rows import differences
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ToolkitError
 from toolkit.planning.drives import fastest
-from toolkit.planning.members import Member, members_of
+from toolkit.planning.members import Member, members_of, row_step
 from toolkit.planning.next_run import RunSearch
 from toolkit.planning.run_changes import Change, RunLimits, changed, movable, reach
 
@@ -61,7 +67,10 @@ PROOFS = Path(__file__).parents[2] / "proof"
 KINDS = ("proposed", "random", "repeat")
 SEARCH_S = 30.0  # of the processor
 PROMISED = 0.9  # power
-SPAN, PACE, CHAMBER_K = 1.5, 3.0, 15.0
+SPAN, PACE, CHAMBER_K, DENSE = 1.5, 3.0, 15.0, 16
+FAMILIES = ("pendulum", "drive", "drive-force", "tank", "thermal", "tire-machine", "tire-python")
+SHORT = ("channel_delay", "filter_lag")
+SHOWN = 2  # times as far from no effect at all as others may be from it: else the recordings show none
 CHAMBERS, WITH_SHAFTS = ("T", "TA"), ("V",)
 
 
@@ -88,6 +97,7 @@ class SealedClass:
     name: str
     sealed: Mapping[str, Any]
     answer: Mapping[str, Any]
+    new: draw.Drawn | None = None
 
     @functools.cached_property
     def effects(self) -> tuple[DiagnosedEffect, ...]:
@@ -107,17 +117,42 @@ class SealedClass:
 
     def drawn(self) -> draw.Drawn | None:
         """Return the case, drawn again; None where the generator of today gives another one."""
+        if self.new is not None:
+            return self.new
         again = draw.draw_case(self.seed, self.sealed["index"], self.sealed["bucket"])
         same = json.loads(json.dumps(again.answer | {"index": self.sealed["index"]})) == self.sealed
         return again if same else None
 
 
-def classes(batches: slice) -> tuple[list[SealedClass], Counter[str]]:
+def drawn_classes(seed: int) -> Iterator[SealedClass]:
+    """Yield classes of what is shorter than it shows, drawn anew, without end."""
+    for index in itertools.count():
+        family = FAMILIES[index % len(FAMILIES)]
+        name = SHORT[index // len(FAMILIES) % len(SHORT)]
+        if name not in catalogue.FAMILIES[family].inside:
+            continue
+        try:
+            again = draw.draw_case(seed, index, "single", picked=(family, (name,)))
+        except RuntimeError:  # no draw met its conditions
+            continue
+        (effect,) = again.answer["effects"]
+        if again.answer["alike"] and effect["distance"] > SHOWN * draw.ALIKE:
+            effect = {
+                "name": name, "channel": effect["channel"], "parameters": (),
+                "equivalent_to": tuple(sorted(again.answer["alike"])),
+            }  # fmt: skip
+            yield SealedClass(
+                batch=f"seed {seed}", seed=seed, name=f"case {index}", sealed=again.answer,
+                answer={"effects": [effect]}, new=again,
+            )  # fmt: skip
+
+
+def classes() -> tuple[list[SealedClass], Counter[str]]:
     """Return the classes that sealed batches left, the newest batch first, and what is left out."""
     found: list[SealedClass] = []
     absent: Counter[str] = Counter()
     rows = [json.loads(line) for line in (PROOFS / "batches.jsonl").read_text(encoding="utf-8").splitlines()]
-    for row in rows[::-1][batches]:
+    for row in rows[::-1]:
         path = PROOFS / f"proof-{row['answers_sha256'][:16]}.jsonl.gz"
         if not path.exists():
             continue
@@ -149,7 +184,10 @@ def carried_out(
     """Return a planned run and what the truth records of it, after all that was recorded before."""
     s = drawn.scenario
     base = next(known for known in s.runs if known.name == name)
-    fine = dict(base.fine)
+    # As many steps between denser rows as between those of the generator's own runs.
+    denser = round(float(base.rows[1] - base.rows[0]) / float(run.t[1] - run.t[0]))
+    places = np.arange((len(base.fine["t"]) - 1) * denser + 1) / denser
+    fine = {key: np.interp(places, np.arange(len(y)), y) for key, y in base.fine.items()}
     if "push" in fine:  # what pushes a plant comes no second time
         fine["push"] = np.std(fine["push"]) * process_noise._push(base, rng)
     later = float(run.t[0] - base.rows[0])  # as the plan has it: after all that was recorded
@@ -166,9 +204,7 @@ def carried_out(
     if s.family == "drive-force":  # the path is not recorded: it follows the velocity
         fine["x"] = np.cumsum(fine["v"]) * (fine["t"][1] - fine["t"][0])
     fine["t"] = fine["t"] + later
-    there = dataclasses.replace(
-        base, name="next.csv", fine=fine, rows=base.rows + later, conditions=run.conditions
-    )
+    there = dataclasses.replace(base, name="next.csv", fine=fine, rows=run.t, conditions=run.conditions)
     alone = dataclasses.replace(s, runs=(there,))
     p = s.true_parameters()
     before = draw._before_converter(alone, p, drawn.effects, [s.truth(there, p, drawn.effects)])
@@ -259,6 +295,8 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
     posed = problem(folder / "before" / "CASE.toml")
     began = time.process_time()
     members = members_of(posed, left.effects, found)
+    if left.new is not None and named(posed, members) is not None:
+        return "the recordings name one"
     ends = time.process_time() + SEARCH_S
     limits = laboratory_limits(posed)
     search = RunSearch(
@@ -304,10 +342,11 @@ def laboratory_limits(posed: Problem) -> RunLimits:
         if source is None:
             runs = [run for run in posed.case.runs if name in run.columns]
             rates[name] = PACE * max(fastest(run.t, run.columns[name]) for run in runs)
-    return RunLimits(values=values, rates=rates)
+    step_s = min(row_step(run) for run in posed.runs) / DENSE
+    return RunLimits(values=values, rates=rates, step_s=step_s)
 
 
-def outcomes(listed: Sequence[SealedClass], minutes: float, seed: int) -> Iterator[Outcome | str]:
+def outcomes(listed: Iterable[SealedClass], minutes: float, seed: int) -> Iterator[Outcome | str]:
     """Yield the outcomes of classes, until the processor has had its minutes."""
     ends = time.process_time() + 60 * minutes
     for place, left in enumerate(listed):
@@ -334,19 +373,20 @@ def table(rows: list[Outcome]) -> str:
 def main() -> None:
     """Print every outcome as it comes, then the table."""
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.sealed_classes", description=__doc__)
-    parser.add_argument("--batches", default="0..99", help="from..to, the newest is 0")
+    parser.add_argument("--drawn", type=int, help="seed of classes drawn anew, in place of the batches")
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=27)
     given = parser.parse_args()
-    first, last = map(int, given.batches.split(".."))
-    listed, absent = classes(slice(first, last))
-    sys.stdout.write(f"{len(listed)} classes of sealed batches; left out: {dict(absent)}\n")
-    if last - first > 1:
-        listed = [listed[i] for i in np.random.default_rng(given.seed).permutation(len(listed))]
+    listed: Iterable[SealedClass]
+    if given.drawn is None:
+        listed, absent = classes()
+        sys.stdout.write(f"{len(listed)} classes of sealed batches; left out: {dict(absent)}\n")
+    else:
+        listed = drawn_classes(given.drawn)
     rows: list[Outcome] = []
     uncounted: Counter[str] = Counter()
-    for outcome in outcomes(listed[: given.cases], given.minutes, given.seed):
+    for outcome in outcomes(itertools.islice(listed, given.cases), given.minutes, given.seed):
         if isinstance(outcome, str):
             uncounted[outcome] += 1
             sys.stdout.write(f"  not counted: {outcome}\n")

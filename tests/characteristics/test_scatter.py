@@ -131,3 +131,18 @@ def test_what_the_form_of_a_moment_misses_is_no_error_of_the_force() -> None:
         assert row is not None
         assert row.estimate is not None
         assert value < 3 * row.estimate.u
+
+
+def test_a_form_that_changes_its_sign_is_none_at_zero_slip_whatever_the_steps() -> None:
+    """The tire's own part is that of a step at the step, half of it half way to zero, and none at zero."""
+    angles = (-10.0, -8.0, -6.0, -4.0, -2.0, 2.0, 4.0, 6.0, 8.0, 10.0)
+    found, directions = scatter(reduced_test(angles=angles, loads=THREE))
+    found = dataclasses.replace(found, variances=np.eye(10)[7])
+    first = directions[0]
+    none = {"FY": np.zeros(len(angles))}
+    own = {
+        at: sum(e.share for e in found.form(first, none, ("FY", math.radians(at)))) for at in (0.0, 1.0, 2.0)
+    }
+    assert own[0.0] == 0.0
+    assert own[1.0] == pytest.approx(own[2.0] / 2)
+    assert own[2.0] != 0.0

@@ -14,7 +14,7 @@ import pytest
 
 import toolkit
 from tests import commands
-from tests.planning.class_factory import answer, found, write_case
+from tests.planning.class_factory import DELAY, answer, found, write_case
 from tests.planning.planning_factory import LOADS, earlier
 from toolkit.declared import json_value
 from toolkit.errors import ConfigError
@@ -123,18 +123,25 @@ def test_a_tire_file_that_is_not_there(run):
     assert failed.exception.exit_code == 2
 
 
-@pytest.fixture
-def diagnosed(tmp_path):
+def left_open(home, *, delay=DELAY, recording=""):
     """A case, and an answer that leaves a late and a lagging channel as one class."""
     from toolkit.diagnosis.case.reader import read_case
 
-    case = write_case(tmp_path / "case")
-    folder = tmp_path / "answer"
+    case = write_case(home / "case", delay=delay)
+    text = case.read_text(encoding="utf-8")
+    assert "[recording]\n" in text
+    case.write_text(text.replace("[recording]\n", f"[recording]\n{recording}"), encoding="utf-8")
+    folder = home / "answer"
     folder.mkdir()
     leaves = answer(read_case(case).sha256, found("channel_delay", "filter_lag"))
     (folder / "diagnosis.json").write_text(json.dumps({"schema": 1, **json_value(leaves)}), encoding="utf-8")
     (folder / "model.toml").write_text('[answer]\ncase = "../case/CASE.toml"\n', encoding="utf-8")
     return folder
+
+
+@pytest.fixture
+def diagnosed(tmp_path):
+    return left_open(tmp_path)
 
 
 def test_the_next_run_is_written_with_what_each_member_predicts(run, diagnosed, tmp_path):
@@ -197,6 +204,7 @@ def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
         (["--rate", "u=1..2"], "NAME=MOST"),
         (["--rate", "w=1"], "of u"),
         (["--limit", "u=-1..1", "--limit", "u=-2..2"], "each input once"),
+        (["--sample-rate", "20"], "50 Hz at least"),
     ],
 )
 def test_a_limit_that_cannot_be_read(run, diagnosed, arguments, part):
@@ -211,6 +219,28 @@ def test_limits_within_which_nothing_parts_are_refused_with_what_would(run, diag
     assert (error.rule, error.exit_code) == ("plan-infeasible", 2)
     assert "channel_delay" in str(error.next_step)
     assert not (tmp_path / "n").exists()
+
+
+def test_what_is_shorter_than_a_row_is_refused_with_the_rate_that_parts_it_and_planned_at_it(run, tmp_path):
+    failed = run("plan", "next", left_open(tmp_path / "a", delay=0.004))
+    assert (failed.exception.rule, failed.exception.exit_code) == ("plan-infeasible", 2)
+    rate = re.search(r"--sample-rate (\d+)", str(failed.exception.next_step))
+    assert rate is not None
+    # What an option states for one plan the case may state for all.
+    stated = f'sample_rate = {{ value = {rate[1]}, unit = "Hz" }}\n'
+    planned = run(
+        "plan", "next", left_open(tmp_path / "b", delay=0.004, recording=stated), "--out", "n", "--json"
+    )
+    assert planned.return_value == 0, planned
+    said = json.loads(planned.stdout)
+    assert said["together"] == []
+    assert "a row every" in " ".join(said["steps"])
+    t = [float(row.split(",")[0]) for row in (tmp_path / "n" / "next.csv").read_text().splitlines()[1:]]
+    assert min(b - a for a, b in itertools.pairwise(t)) >= (1 - 1e-6) / float(rate[1])
+    seldom = run(
+        "plan", "next", left_open(tmp_path / "c", recording='sample_rate = { value = 20, unit = "Hz" }\n')
+    )
+    assert "CASE.toml" in str(seldom.exception.where)
 
 
 def test_another_case_than_the_answers_is_refused(run, diagnosed, tmp_path):

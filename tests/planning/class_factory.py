@@ -26,19 +26,19 @@ FREQUENCY = 0.2
 T = np.arange(500) * 0.02
 
 
-def late(u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def late(u: np.ndarray, rng: np.random.Generator, *, t: np.ndarray = T, delay: float = DELAY) -> np.ndarray:
     """The plant: 102 N/mm, late, 1 N of noise."""
-    return np.asarray(102 * np.interp(T - DELAY, T, u) + rng.normal(0, 1.0, len(T)))
+    return np.asarray(102 * np.interp(t - delay, t, u) + rng.normal(0, 1.0, len(t)))
 
 
-def write_case(folder: Path, **more: pd.DataFrame) -> Path:
+def write_case(folder: Path, *, delay: float = DELAY, **more: pd.DataFrame) -> Path:
     """Write the case; ``more`` are further runs by name."""
     folder.mkdir(parents=True, exist_ok=True)
     text = CASE
     for number in range(2):
         # From rest: neither member has to know what was before.
         u = (2.0 - 0.5 * number) * np.sin(2 * np.pi * FREQUENCY * T) * np.minimum(T, 1.0)
-        run = pd.DataFrame({"t": T, "u": u, "F": late(u, np.random.default_rng(number))})
+        run = pd.DataFrame({"t": T, "u": u, "F": late(u, np.random.default_rng(number), delay=delay)})
         run.to_csv(folder / f"r{number}.csv", index=False)
     for name, run in more.items():
         run.to_csv(folder / f"{name}.csv", index=False)
@@ -74,7 +74,7 @@ def answer(case_sha256: str, *effects: DiagnosedEffect) -> Diagnosis:
     )  # fmt: skip
 
 
-def with_run(folder: Path, u: np.ndarray, seed: int) -> Problem:
+def with_run(folder: Path, u: np.ndarray, seed: int, *, t: np.ndarray = T, delay: float = DELAY) -> Problem:
     """The problem with one more run, as the plant answers its inputs."""
-    more = pd.DataFrame({"t": T, "u": u, "F": late(u, np.random.default_rng(seed))})
-    return problem(write_case(folder, more=more))
+    more = pd.DataFrame({"t": t, "u": u, "F": late(u, np.random.default_rng(seed), t=t, delay=delay)})
+    return problem(write_case(folder, delay=delay, more=more))

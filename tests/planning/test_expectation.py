@@ -122,11 +122,17 @@ def test_a_test_without_curves_is_refused() -> None:
     assert error.value.rule == "plan-like"
 
 
-def test_several_tests_are_surer_of_the_scatter_than_one() -> None:
-    one = earlier()
-    four = pooled([one] * 4)
-    np.testing.assert_allclose(four.variances, one.variances)
-    np.testing.assert_allclose(four.variances_u, one.variances_u / 2)
+def test_several_tests_tell_of_one_scatter_together() -> None:
+    """What an estimate of a single test imagines, because it cannot fall below zero, its mean keeps."""
+    tests = [earlier_test(drawn(PROTOCOL, seed), machine=M15, record=None) for seed in range(6)]
+    together = pooled(tests)
+    mean = np.mean([one.variances for one in tests], axis=0)
+    imagined = np.flatnonzero((VARIANCES == 0) & (mean > 0))
+    assert len(imagined) >= 3
+    assert np.mean(together.variances[imagined] / mean[imagined]) < 0.5
+    seen = [0, 1]
+    np.testing.assert_allclose(together.variances[seen], VARIANCES[seen], rtol=0.5)
+    assert (together.variances_u[seen] < np.mean([one.variances_u[seen] for one in tests], axis=0)).all()
 
 
 def test_a_block_is_carried_by_its_neighbours_the_worse_the_fewer_they_are() -> None:

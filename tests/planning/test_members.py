@@ -14,6 +14,7 @@ from tests.planning.class_factory import DELAY, answer, found, problem, write_ca
 from toolkit.diagnosis.fit.noise import Autoregression
 from toolkit.errors import ConfigError
 from toolkit.planning.members import (
+    Member,
     Predicted,
     class_of,
     completed,
@@ -28,8 +29,9 @@ def gaussian(mean: np.ndarray, spread: np.ndarray) -> Predicted:
     return Predicted(outputs={"F": mean}, spread={"F": spread}, between={"F": np.zeros((len(mean), 0))})
 
 
-def member(sd: float) -> Any:
-    return SimpleNamespace(fit=SimpleNamespace(noise={"F": Autoregression(reflection=(), sd=sd)}))
+def member(sd: float) -> Member:
+    fit: Any = SimpleNamespace(noise={"F": Autoregression(reflection=(), sd=sd)})
+    return Member(label="", fit=fit)
 
 
 RUN: Any = SimpleNamespace(t=np.arange(6.0), rows=6)
@@ -62,6 +64,15 @@ def test_what_a_parameter_may_absorb_does_not_part() -> None:
 def test_the_noise_counts_under_which_two_are_less_apart() -> None:
     a, b = gaussian(np.zeros(6), np.zeros((6, 0))), gaussian(np.ones(6), np.zeros((6, 0)))
     assert expected_log_evidence(RUN, [member(0.1), member(1.0)], a, b) == pytest.approx(3.0)
+
+
+def test_denser_rows_tell_no_more_of_what_is_slow() -> None:
+    """A step of one noise's size, of 6 rows and of 60 in the same time: as much evidence by either."""
+    known = dataclasses.replace(member(1.0), step_s=1.0)
+    dense: Any = SimpleNamespace(t=np.arange(60) / 10, rows=60)
+    for run in (RUN, dense):
+        a, b = (gaussian(np.full(run.rows, level), np.zeros((run.rows, 0))) for level in (0.0, 1.0))
+        assert expected_log_evidence(run, [known], a, b) == pytest.approx(3.0)
 
 
 def test_members_are_fitted_in_each_others_place(tmp_path: Path) -> None:

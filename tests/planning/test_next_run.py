@@ -44,6 +44,29 @@ def test_the_proposed_run_is_faster_and_names_the_true_member(search: RunSearch,
     assert first.fit.log_posterior - second.fit.log_posterior > 3
 
 
+def test_what_is_shorter_than_a_row_is_parted_by_denser_rows(tmp_path: Path) -> None:
+    """A delay of a fifth of a row against a lag: no run in rows of 20 ms parts them, one of 5 ms does."""
+    delay = 0.004
+    posed = problem(write_case(tmp_path / "before", delay=delay))
+    members = members_of(posed, (EFFECT,), EFFECT)
+    as_recorded = RunSearch(problem=posed, members=members, limits=RunLimits())
+    blind = as_recorded.judge(as_recorded.best())
+    assert blind is not None
+    assert blind.change.rows == 1
+    assert blind.together != ()
+    search = anew(as_recorded, limits=RunLimits(step_s=0.0025))
+    chosen = search.judge(search.best())
+    assert chosen is not None
+    assert chosen.together == ()
+    assert chosen.power > 0.9
+    assert chosen.run.t[1] - chosen.run.t[0] >= 0.0025 * (1 - 1e-9)
+    assert f"rows {chosen.change.rows} times as dense" in " ".join(chosen.change.words())
+    more = with_run(tmp_path / "after", chosen.run.columns["u"], seed=9, t=chosen.run.t, delay=delay)
+    first, second = members_of(more, (EFFECT,), EFFECT)
+    assert first.label == "channel_delay on F"
+    assert first.fit.log_posterior - second.fit.log_posterior > 3
+
+
 def test_the_power_is_that_of_the_nearest_of_the_others() -> None:
     near = power_of([("a", "b", 3.0), ("a", "c", 300.0), ("b", "a", 300.0), ("c", "a", 300.0)])
     assert near == pytest.approx((0.5 + 1 + 1) / 3, abs=1e-6)

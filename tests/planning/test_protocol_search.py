@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.characteristics.tire_factory import C_FY, M15, at_load
-from tests.planning.planning_factory import LOADS, earlier
+from tests.planning.planning_factory import LOADS, VARIANCES, earlier
 from toolkit.errors import ConfigError
 from toolkit.planning import protocol_search
 from toolkit.planning.demands import parse_demand
@@ -78,6 +78,23 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
         found = search.best(size)
         screened = criterion(search._screens, np.array([search._best[size]]))[0]
         assert screened == pytest.approx(found.worst, rel=0.05)
+
+
+def test_the_screen_knows_what_the_form_of_the_curves_misses() -> None:
+    """It adds up over both sides and directions: by squares alone it would be three times as large here."""
+    form = np.array([0.0] * 7 + [30.0**2, 0.6**2, math.radians(0.01) ** 2])
+    known = dataclasses.replace(earlier(), variances=VARIANCES + form, variances_u=0.0 * VARIANCES)
+    demands = tuple(map(parse_demand, ("conicity=2 N", "slope_cornering=2 %", "FY@8deg=40 N")))
+    asked = Question(tires=(known,), demands=demands, loads_N=LOADS)
+    search = ProtocolSearch(asked, tread(), LOADS)
+    for size in (10, 13):
+        points = (
+            tuple(range(0, 21, 2))[:size] if size < 11 else (0, 2, 4, 6, 8, 9, 10, 11, 12, 14, 16, 18, 20)
+        )
+        screened, _ = search._screens[0].ratios(np.array([points]))
+        reaches = asked.reaches(search.design(points), known=True)
+        budget = [1.96 * reach.u / reach.limit for reach in reaches]
+        np.testing.assert_allclose(screened[0], budget, rtol=0.05)
 
 
 @pytest.mark.campaign("four searches of one size each: the whole search is held in every run")

@@ -95,6 +95,11 @@ class Scatter:
     covariance: Array
     directions: Mapping[tuple[float, str], Sensitivity]
 
+    @property
+    def variances_u(self) -> Array:
+        """Standard uncertainties of the variances (10,)."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
     def of(self, direction: Direction, weights: Mapping[Channel, Array]) -> tuple[float, float]:
         """Return u and degrees of freedom of a weighted sum of a direction's conditions, without `form`."""
         squares = self._squares(direction, weights)
@@ -112,7 +117,8 @@ class Scatter:
         conditions.
 
         ``at`` is a channel and the slip angle [rad] at which its curve is read: what the form misses there is
-        in the tire, and its want in the curve.
+        in the tire, and its want in the curve. It is that of the nearest step, and within the innermost steps
+        as much less as it is nearer to zero, where an error that changes its sign is none.
         """
         sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
         for source in _OF_FORM:
@@ -124,7 +130,9 @@ class Scatter:
             moved = np.sum([w * sensitivity.by_channel[c][source] for c, w in weights.items()], axis=0)
             if at is not None:
                 nearest = int(np.argmin(np.abs(direction.group.SA - at[1])))
-                moved[nearest] -= sensitivity.by_channel[at[0]][source, nearest]
+                step = direction.group.conditions[nearest].step_SA
+                share = min(at[1] / step, 1.0) if step else 1.0
+                moved[nearest] -= share * sensitivity.by_channel[at[0]][source, nearest]
             shares = np.bincount(sensitivity.places, moved) * np.sqrt(variance)
             for place in np.unique(sensitivity.places).tolist():
                 yield FormError(source=source, place=place, share=float(shares[place]), dof=dof)
@@ -134,6 +142,12 @@ class Scatter:
         sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
         first = _OF_FORM[0]  # what the form of a curve misses is no error of what was measured
         return np.asarray(self.variances[:first] @ sensitivity.by_channel[channel][:first] ** 2)
+
+    def forms(self, direction: Direction, channel: Channel) -> Array:
+        """Return what `form` moves each condition by, in standard deviations (sources, conditions)."""
+        sensitivity = self.directions[direction.group.load_N, direction.group.rotation]
+        sizes = np.sqrt(self.variances[list(_OF_FORM)])
+        return np.asarray(sizes[:, None] * sensitivity.by_channel[channel][list(_OF_FORM)])
 
     def _squares(self, direction: Direction, weights: Mapping[Channel, Array]) -> Array:
         # What one error moves, in both channels, adds before it is squared.
@@ -165,21 +179,31 @@ def weights_of(direction: Direction, channel: Channel) -> Array:
     return np.asarray(scale[:, None] * pseudo)
 
 
-def scatter_of(directions: Sequence[Direction], *, expected: Array | None = None) -> Scatter:
+def scatter_of(
+    directions: Sequence[Direction],
+    *,
+    beside: Sequence[Sequence[Direction]] = (),
+    expected: Array | None = None,
+) -> Scatter:
     """Return the scatter of the conditions of a test about all its curves.
 
     Parameters
     ----------
+    beside : directions of further tests of the same tire, which tell of the same variances
     expected : variances of the sources (10,) of a test that is yet to be made: what it will say of them, on
         average, in place of what the residuals say
     """
     sensitivities = _sensitivities(directions)
     scale = _scale(directions, sensitivities)
-    together = [
-        [d for d in directions if d.group.rotation == rotation and (d.fit.FY or d.fit.MZ)]
+    curves = [
+        _Residuals.of(mine, of_test, scale)
+        for test, of_test in (
+            (directions, sensitivities),
+            *((other, _sensitivities(other)) for other in beside),
+        )
         for rotation in ROTATIONS
+        if (mine := [d for d in test if d.group.rotation == rotation and (d.fit.FY or d.fit.MZ)])
     ]
-    curves = [_Residuals.of(mine, sensitivities, scale) for mine in together if mine]
     if expected is not None:
         curves = [curve.expecting(expected / scale**2) for curve in curves]
     freedoms = sum(len(curve.rows) for curve in curves)
@@ -191,7 +215,7 @@ def scatter_of(directions: Sequence[Direction], *, expected: Array | None = None
         for source in range(_SOURCES)
     ])  # fmt: skip
     variances, covariance = _restricted(curves, free)
-    # What the form misses is the same in both directions: the second tells nothing new of its size.
+    # What the form misses is the same in both directions and all tests of a tire: none tells it anew.
     again = np.where(np.isin(np.arange(_SOURCES), _OF_FORM), np.sqrt(len(curves)), 1.0)
     covariance = covariance * np.outer(again, again)
     return Scatter(

@@ -158,6 +158,11 @@ class PointSearch:
         """Return the best design that exchanges from several starts end at."""
         return best_of((tuple(sorted(start)) for start in starts), self.improved, self.loss)
 
+    def nearest(self, size: int, count: int) -> tuple[Points, ...]:
+        """Return the designs of a size that were judged and have the least loss, the least first."""
+        judged = ((loss, design) for design, loss in self._judged.items() if len(design) == size)
+        return tuple(design for _, design in sorted(judged)[:count])
+
     def _alternatives(self, design: Points, place: int) -> Alternatives[Points]:
         remaining = _without(design, place)
 

@@ -54,11 +54,11 @@ class _Curve:
 class EarlierTest:
     """What a plan takes from a test.
 
-    ``variances`` (4,) and ``variances_u`` (4,) are those of the sources of scatter with their standard
-    uncertainties, ``load_spread`` how far blocks stood off their common load, as a share; ``offset_rad`` by
-    how much the wheel stood beyond its step on average, which is the steering's zero; ``mirrored`` names
-    directions that it lacks, whose curves are those of the other one; ``tire`` names its tire in a class;
-    ``lengths_m`` are the relaxation lengths that it measured, by nominal load.
+    ``measured`` are its directions; ``variances`` and ``variances_u`` (sources,) those of the sources of
+    scatter with their standard uncertainties; ``load_spread`` is how far blocks stood off their common load,
+    as a share; ``offset_rad`` by how much the wheel stood beyond its step on average, which is the steering's
+    zero; ``mirrored`` names directions that it lacks, whose curves are those of the other one; ``tire`` names
+    its tire in a class; ``lengths_m`` are the relaxation lengths that it measured, by nominal load.
     """
 
     machine: Machine
@@ -72,6 +72,7 @@ class EarlierTest:
     mirrored: tuple[Rotation, ...] = ()
     tire: str = ""
     lengths_m: dict[float, float] = dataclasses.field(default_factory=dict)
+    measured: tuple[Direction, ...] = ()
 
     @property
     def loads_N(self) -> tuple[float, ...]:
@@ -189,14 +190,19 @@ class EarlierTest:
         """Return the directions of a design with the scatter that its residuals will show on average."""
         return _foreseen(self, design, shift)
 
-    def rows(self, design: Design, demands: Collection[Demand], *, shift: float = 0.0) -> tuple[Row, ...]:
+    def rows(
+        self, design: Design, demands: Collection[Demand], *, shift: float = 0.0, known: bool = False
+    ) -> tuple[Row, ...]:
         """Return the rows that demands name, as the design's reduced test will have them.
 
         Parameters
         ----------
         shift : of the scatter's variances, in their standard uncertainties: how sure the rows are
+        known : by the scatter as this test has it, whatever the design's own residuals will show of it
         """
         directions, scatter = self.foreseen(design, shift=shift)
+        if known:
+            scatter = dataclasses.replace(scatter, variances=self.variances)
         named = {(demand.characteristic, demand.SA_rad) for demand in demands if demand.name != PEAK}
         peaks = self._peaks(design) if any(demand.name == PEAK for demand in demands) else ()
 
@@ -270,8 +276,9 @@ def earlier_test(result: TestResult, *, machine: Machine, record: CalibrationRec
         shared=shared_errors_of(reduced, machine=machine, record=record),
         curves={key: curve for key, curve in curves.items() if key[0] in both},
         cells=_cells(reduced.used(), machine, result),
+        measured=directions,
         variances=scatter.variances,
-        variances_u=np.sqrt(np.maximum(np.diag(scatter.covariance), 0.0)),
+        variances_u=scatter.variances_u,
         offset_rad=float(
             np.mean([c.SA - c.step_SA for c in reduced.used() if c.step_SA is not None] or [0.0])
         ),
@@ -288,18 +295,17 @@ def earlier_test(result: TestResult, *, machine: Machine, record: CalibrationRec
 
 
 def pooled(tests: Sequence[EarlierTest]) -> EarlierTest:
-    """Return the first of several tests of one tire, with the mean of their scatter: one alone says little.
+    """Return the first of several tests of one tire, with the scatter that all of them show together.
+
+    One alone says little of so many variances, and their mean takes for seen what a single test imagined.
 
     Parameters
     ----------
     tests : at least one, of the same loads
     """
-    count = len(tests)
-    return dataclasses.replace(
-        tests[0],
-        variances=np.mean([test.variances for test in tests], axis=0),
-        variances_u=np.sqrt(np.sum([test.variances_u**2 for test in tests], axis=0)) / count,
-    )
+    first, *others = tests
+    scatter = scatter_of(first.measured, beside=[other.measured for other in others])
+    return dataclasses.replace(first, variances=scatter.variances, variances_u=scatter.variances_u)
 
 
 def _similar(fit: CurveFit, factors: Mapping[str, float]) -> CurveFit:

@@ -10,7 +10,8 @@ Atkinson and Fedorov, Biometrika 62 (1975) 57, with the recordings as prior).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from toolkit.arrays import Array
 from toolkit.diagnosis.answer.answer import DiagnosedEffect, Diagnosis
 from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.fit.fit import Fit, fit
-from toolkit.diagnosis.fit.noise import Autoregression, layout, whiten
+from toolkit.diagnosis.fit.noise import layout, whiten
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.search.candidates import CandidateEffect, candidates
 from toolkit.effects.applied import AppliedEffect
@@ -33,10 +34,27 @@ _WIDEST = 3.0  # sd of a parameter that the recordings leave open, in its own si
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Member:
-    """One explanation: its name and place, and the fit with it in the recordings."""
+    """One explanation: its name and place, and the fit with it in the recordings.
+
+    ``step_s`` is the time from row to row [s] of the recordings, whose noise is that of the fit.
+    """
 
     label: str
     fit: Fit
+    step_s: float = math.inf
+
+    def white(self, run: Run, values: Mapping[str, Array]) -> Array:
+        """Return columns of every output (n,) or (n, k), one below the other, in the noise's deviations.
+
+        Of rows that are denser than the recordings' each has as much more noise: its density over time
+        stays, so that they tell of what lies between the rows, and no more than before of all else.
+        """
+        where = layout([run.t], [np.ones(run.rows, dtype=bool)])
+        denser_by = max(self.step_s / row_step(run), 1.0) if math.isfinite(self.step_s) else 1.0
+        columns = [
+            whiten(column[where.index], where, self.fit.noise[name]) for name, column in values.items()
+        ]
+        return np.asarray(np.concatenate(columns) / math.sqrt(denser_by))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,7 +119,8 @@ def members_of(
         fits = [fitted for place in places for fitted in _fits(problem, place, others)]
         if fits:
             best = max(fits, key=lambda fitted: fitted.log_posterior)
-            members.append(Member(label=best.active[-1].key.label, fit=best))
+            step_s = min(row_step(run) for run in problem.runs)
+            members.append(Member(label=best.active[-1].key.label, fit=best, step_s=step_s))
     if len(members) < 2:
         raise ConfigError(
             "fewer than two members of the class can be fitted", where=problem.case.path,
@@ -127,21 +146,32 @@ def _fits(problem: Problem, place: CandidateEffect, others: Sequence[AppliedEffe
             continue
 
 
+def row_step(run: Run) -> float:
+    """Return the usual time from row to row [s]."""
+    return float(np.median(np.diff(run.t))) if run.rows > 1 else math.inf
+
+
+def refined(run: Run, times: int) -> Run:
+    """Return a run with so many rows for each that it has, all straight between those."""
+    if times == 1:
+        return run
+    places = np.arange((run.rows - 1) * times + 1) / times
+    t = np.interp(places, np.arange(run.rows), run.t)
+    columns = {name: np.interp(t, run.t, column) for name, column in run.columns.items()}
+    return dataclasses.replace(run, t=t, columns=columns)
+
+
 def denser(run: Run, drivers: Sequence[str]) -> tuple[Run, Run]:
     """Return a run with a row between each two, twice: its drivers straight between rows, and smooth."""
     from scipy.interpolate import Akima1DInterpolator
 
-    t = np.insert(run.t, np.arange(1, run.rows), (run.t[1:] + run.t[:-1]) / 2)
-    straight = {name: np.interp(t, run.t, column) for name, column in run.columns.items()}
+    straight = refined(run, 2)
     smooth = {
-        name: np.asarray(Akima1DInterpolator(run.t, run.columns[name])(t))
+        name: np.asarray(Akima1DInterpolator(run.t, run.columns[name])(straight.t))
         for name in drivers
         if name in run.columns
     }
-    return (
-        dataclasses.replace(run, t=t, columns=straight),
-        dataclasses.replace(run, t=t, columns=straight | smooth),
-    )
+    return straight, dataclasses.replace(straight, columns={**straight.columns, **smooth})
 
 
 def predict(problem: Problem, member: Member, run: Run) -> Predicted | None:
@@ -206,7 +236,7 @@ def completed(
     steps = [*away, begin]
     moved = _simulated(problem, run, fitted, steps)
     ways = [
-        _lost(run, fitted.noise, predicted, outputs, np.linalg.pinv(root) @ step)
+        _lost(run, member, predicted, outputs, np.linalg.pinv(root) @ step)
         for step, outputs in zip(steps, moved, strict=True)
         if outputs is not None  # beyond what the simulation runs with no fit goes
     ]
@@ -214,16 +244,14 @@ def completed(
     return dataclasses.replace(predicted, between=between, lost=lost)
 
 
-def _lost(
-    run: Run, noise: dict[str, Autoregression], predicted: Predicted, moved: dict[str, Array], by: Array
-) -> float:
+def _lost(run: Run, member: Member, predicted: Predicted, moved: dict[str, Array], by: Array) -> float:
     """Return what a fit misses that goes by derivatives, where half of a change is not as they say.
 
     Such a fit may end anywhere: of a pendulum that goes over the top, of waves that are late by more than
     half of one. ``by`` (n,) is what parameters are moved by, in standard deviations.
     """
-    change = _white(run, {name: moved[name] - column for name, column in predicted.outputs.items()}, noise)
-    slope = _white(run, {name: columns @ by for name, columns in predicted.spread.items()}, noise)
+    change = member.white(run, {name: moved[name] - column for name, column in predicted.outputs.items()})
+    slope = member.white(run, {name: columns @ by for name, columns in predicted.spread.items()})
     size = float(change @ change)
     along = float(change @ slope) ** 2 / max(float(slope @ slope), 1e-300)
     return 0.0 if along >= size / 2 else 0.5 * (size - along)
@@ -307,15 +335,15 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
     ----------
     members : those of the two predictions
     """
-    expected = min(_divergence(run, member.fit.noise, true, rival) for member in members)
+    expected = min(_divergence(run, member, true, rival) for member in members)
     return max(expected - true.lost - rival.lost, min(expected, 0.0))
 
 
-def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, rival: Predicted) -> float:
-    gap = _white(run, {name: true.outputs[name] - column for name, column in rival.outputs.items()}, noise)
-    open_to_both = [_white(run, predicted.between, noise) for predicted in (true, rival)]
+def _divergence(run: Run, member: Member, true: Predicted, rival: Predicted) -> float:
+    gap = member.white(run, {name: true.outputs[name] - column for name, column in rival.outputs.items()})
+    open_to_both = [member.white(run, predicted.between) for predicted in (true, rival)]
     own, rivals = (
-        np.hstack([_white(run, predicted.spread, noise), *open_to_both]) for predicted in (true, rival)
+        np.hstack([member.white(run, predicted.spread), *open_to_both]) for predicted in (true, rival)
     )
     inner, of_own = (np.eye(w.shape[1]) + w.T @ w for w in (rivals, own))
     through, crossed = rivals.T @ gap, rivals.T @ own
@@ -324,15 +352,7 @@ def _divergence(run: Run, noise: dict[str, Autoregression], true: Predicted, riv
     trace -= float(np.sum(crossed * np.linalg.solve(inner, crossed)))
     logs = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(of_own)[1])
     expected = 0.5 * (squares + trace + logs)
-    spread = _white(run, rival.spread, noise)
+    spread = member.white(run, rival.spread)
     apart = gap - spread @ np.linalg.solve(np.eye(spread.shape[1]) + spread.T @ spread, spread.T @ gap)
     misled = max((abs(float(apart @ w[:, 0])) for w in open_to_both if w.shape[1]), default=0.0) / _BETWEEN
     return min(expected, 0.5 * float(gap @ apart) - misled) if misled else expected
-
-
-def _white(run: Run, values: dict[str, Array], noise: dict[str, Autoregression]) -> Array:
-    """Return columns of every output (n,) or (n, k), one below the other, in standard deviations."""
-    where = layout([run.t], [np.ones(run.rows, dtype=bool)])
-    return np.concatenate(
-        [whiten(column[where.index], where, noise[name]) for name, column in values.items()]
-    )

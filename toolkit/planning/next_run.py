@@ -28,7 +28,16 @@ from toolkit.planning.members import (
     expected_log_evidence,
     predict,
 )
-from toolkit.planning.run_changes import RATES, Change, Level, RunLimits, changed, conditions, movable
+from toolkit.planning.run_changes import (
+    RATES,
+    Change,
+    Level,
+    RunLimits,
+    changed,
+    conditions,
+    densities,
+    movable,
+)
 
 _SIZES = (0.0, 0.5, 1.0, 2.0, 4.0)
 _LEVELS: tuple[Level, ...] = ("low", "high")
@@ -182,7 +191,15 @@ class RunSearch:
 
     def factors(self, change: Change) -> list[tuple[Change, ...]]:
         """Return what each factor of a change may be instead: the recording first."""
-        factors = [tuple(dataclasses.replace(change, run=run.name) for run in self.problem.runs)]
+        recorded = {run.name: run for run in self.problem.runs}
+        dense = {name: densities(run, self.limits) for name, run in recorded.items()}
+        factors = [
+            tuple(
+                dataclasses.replace(change, run=name, rows=min(change.rows, dense[name][-1]))
+                for name in recorded
+            ),
+            tuple(dataclasses.replace(change, rows=times) for times in dense[change.run]),
+        ]
         for key, values in conditions(self.problem).items():
             rest = tuple(entry for entry in change.conditions if entry[0] != key)
             turned = (dataclasses.replace(change, conditions=(*rest, (key, value))) for value in values)
@@ -218,7 +235,7 @@ class RunSearch:
         """Return two factors of an input: how often its course goes up and down, and over which levels."""
         others = tuple(entry for entry in change.drives if entry[0] != name)
         present = dict(change.drives).get(name, Drive(cycles=_CYCLES[0]))
-        rows = next(run.rows for run in self.problem.runs if run.name == change.run)
+        rows = change.rows * next(run.rows for run in self.problem.runs if run.name == change.run)
 
         def with_course(**more: Any) -> tuple[Change, ...]:
             course = dataclasses.replace(present, **more)

@@ -36,6 +36,8 @@ _PEAK_SHARE = 0.99
 _SAME_RAD = 1e-9
 _BEYOND = 1e3  # what a design that goes beyond its limits pays for as much again
 _STARTS, _SEED = 8, 25  # of the exchange, beside the best of another size
+_NEAR = 8  # designs that are judged by the whole budget: those that the exchange met and that screen best
+_FAR = 1.2  # of a limit: a design beyond it stands for all that screen no better
 # A printed U has two digits, and is rounded down by at most this part: within it two are the same.
 _ALIKE = 1.05
 
@@ -85,13 +87,15 @@ class Question:
         slack, steps = machine.protocol.slip_angle_tolerance_rad, steps_of(machine)
         return tuple(step for step in steps if low - slack <= step <= high + slack)
 
-    def reaches(self, design: Design, *, shift: float = 0.0) -> tuple[Reach, ...]:
+    def reaches(self, design: Design, *, shift: float = 0.0, known: bool = False) -> tuple[Reach, ...]:
         """Return what a design reaches of every demand at every load asked for, on each tire; empty where it
         lacks one.
+
+        ``shift`` and ``known`` are those of `EarlierTest.rows`.
         """
         reaches = []
         for earlier in self.tires:
-            rows = earlier.rows(design, self.demands, shift=shift)
+            rows = earlier.rows(design, self.demands, shift=shift, known=known)
             for demand, load in itertools.product(self.demands, self.loads_N):
                 at_load = earlier.curves[load, "forward"].fit.load_N
                 mine = [row for row in rows if is_of(row, demand, at_load)]
@@ -145,7 +149,8 @@ class Question:
 class Judged:
     """A design with what it reaches; ``excess`` by how much it goes beyond time, energy or warmth.
 
-    ``openness`` of the curves between its slip angles, over what is allowed (`screen`); ``demanded``
+    ``openness`` of the curves between its slip angles, over what is allowed (`screen`); ``understated`` the
+    largest u by the scatter that the earlier test shows, over what its own residuals will say; ``demanded``
     is whether anything was asked of it.
     """
 
@@ -154,6 +159,7 @@ class Judged:
     minutes: float
     excess: float = 0.0
     openness: float = 0.0
+    understated: float = 1.0
     demanded: bool = True
 
     @property
@@ -163,8 +169,15 @@ class Judged:
 
     @property
     def feasible(self) -> bool:
-        """Whether every demand is met within the limits, and every curve is known between its slip angles."""
-        return self.worst <= 1 and self.excess <= 0 and self.openness <= 1
+        """Whether every demand is met within the limits, every curve known between its slip angles, and no U
+        smaller than what is known of the scatter makes it.
+        """
+        return self.distance <= (0.0, 1.0)
+
+    @property
+    def distance(self) -> tuple[float, float]:
+        """How far beyond its limits it is, and then beyond what is asked of it: at most 0 and 1 serve."""
+        return self.excess, max(self.worst, self.openness, self.understated / _ALIKE)
 
 
 class ProtocolSearch:
@@ -213,7 +226,15 @@ class ProtocolSearch:
     def judged(self, design: Design) -> Judged:
         """Return a design with what it reaches; one that was judged before is not judged again."""
         if design not in self._judged:
-            self._judged[design] = self._judge(design)
+            judged = self._judge(design)
+            if judged.feasible and judged.demanded:
+                known = self.question.reaches(design, known=True)
+                pairs = zip(known, judged.reaches, strict=True)
+                understated = max(
+                    (by_known.u / shown.u for by_known, shown in pairs if shown.u > 0), default=1.0
+                )
+                judged = dataclasses.replace(judged, understated=understated)
+            self._judged[design] = judged
         return self._judged[design]
 
     def _judge(self, design: Design) -> Judged:
@@ -231,8 +252,24 @@ class ProtocolSearch:
             self._tell(f"{size} slip angles")
             larger = min((n for n in self._best if n > size), default=None)
             start = self._best[larger] if larger else tuple(range(len(self.candidates)))
-            self._best[size] = self._points.best((self._points.resized(start, size), *self._drawn(size)))
+            self._points.best((self._points.resized(start, size), *self._drawn(size)))
+            self._best[size] = self._nearest(self._points.nearest(size, _NEAR))
         return self.judged(self.design(self._best[size]))
+
+    def _nearest(self, designs: Sequence[Points]) -> Points:
+        """Return the first design that serves, or the nearest to it.
+
+        The exchange does not know what a design's own residuals will tell of the scatter.
+        """
+        distances = []
+        for points in designs:
+            judged = self.judged(self.design(points))
+            if judged.feasible:
+                return points
+            distances.append(judged.distance)
+            if judged.distance > (0.0, _FAR):
+                break
+        return designs[min(range(len(distances)), key=distances.__getitem__)]
 
     def _drawn(self, size: int) -> Iterator[Points]:
         """Yield designs of a size drawn at random, the same for the same size."""
@@ -256,7 +293,7 @@ class ProtocolSearch:
 
     def nearest(self) -> Judged:
         """Return the design that was nearest to its limits and then to the demands."""
-        return min((self.best(size) for size in tuple(self._best)), key=_distance)
+        return min((self.best(size) for size in tuple(self._best)), key=lambda judged: judged.distance)
 
     def most_within(self, minutes: float) -> int:
         """Return how many slip angles fit into a time."""
@@ -305,7 +342,7 @@ def least_plan(
             met = least if met is None or least.minutes < met.minutes else met
         elif met is None:
             nearest = search.nearest()
-            nearer = missed is None or _distance(nearest) < _distance(missed)
+            nearer = missed is None or nearest.distance < missed.distance
             missed = nearest if nearer else missed
     if met is None and missed is None:
         raise _too_short(minutes, shortest, beside)
@@ -377,10 +414,6 @@ def rotations_of(demands: Sequence[Demand]) -> tuple[Rotation, ...]:
     """Return the directions that demands need: forward alone where none is of both."""
     both = any(by_name()[demand.characteristic].scope == "load" for demand in demands)
     return ROTATIONS if both else ROTATIONS[:1]
-
-
-def _distance(judged: Judged) -> tuple[float, float]:
-    return judged.excess, max(judged.worst, judged.openness)
 
 
 def shared_loads(tires: Sequence[EarlierTest]) -> tuple[float, ...]:

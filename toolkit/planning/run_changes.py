@@ -4,7 +4,8 @@ A run is a recording of the case with factors changed: how fast its inputs go, h
 them alone moves, a new course of an input (`drives`), a condition such as the way the drum turns or how the
 tire stands on its hub. Inputs stay within what was recorded, or within limits that are given. A channel that
 is another one's rate of change stays that. A covariate is measured and not set: it goes on as it was
-recorded, unless a limit is given, which says that it can be set.
+recorded, unless a limit is given, which says that it can be set. Rows may be denser than recorded where it is
+said how dense the data acquisition can record them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from toolkit.arrays import Array
 from toolkit.diagnosis.simulators.setting import pauses
 from toolkit.planning.drives import Drive, Pace, driven, fastest
+from toolkit.planning.members import refined, row_step
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ RATES = (0.25, 0.5, 1.0, 2.0, 4.0)
 """How many times as fast as recorded a run may be."""
 _OF_A_RECORDING = ("phase", "date", "order", "repeat_of", "file")  # and of no other run
 _IS_RATE = 0.98  # of the variance of a channel that another one's derivative explains
+_DOUBLINGS = 4  # of the rows: each takes twice as long to simulate
 _SLACK = 1e-9
 _BETWEEN_ROWS = 0.01  # of an input's span, by which a straight line from row to row may miss its course
 # What else can be done with a tire on a drum, beside the conditions that the recordings have.
@@ -43,14 +46,16 @@ _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 class RunLimits:
     """What the machine allows, by channel in its unit: ``values`` (low, high), ``rates`` a second.
 
-    What is not stated is as recorded: the span of values, and up to four times the rate.
+    ``step_s`` is the least time from row to row [s] that the data acquisition can record. What is not stated
+    is as recorded: the span of values, up to four times the rate, and the rows.
     """
 
     values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rates: Mapping[str, float] = field(default_factory=dict)
+    step_s: float = math.inf
 
     def __bool__(self) -> bool:
-        """Tell whether anything is stated."""
+        """Tell whether anything is stated that a recording may not keep."""
         return bool(self.values or self.rates)
 
 
@@ -60,10 +65,12 @@ class Change:
 
     ``rate`` of the inputs, ``sizes`` of each about its middle, ``mirrored`` those whose sign is turned, rates
     of change with them, ``levels`` of those that are moved to an end of their limits, ``drives`` those that
-    have a course of their own between their limits, ``conditions`` that differ.
+    have a course of their own between their limits, ``conditions`` that differ. ``rows`` are recorded for
+    each row of the recording.
     """
 
     run: str
+    rows: int = 1
     rate: float = 1.0
     sizes: tuple[tuple[str, float], ...] = ()
     mirrored: tuple[str, ...] = ()
@@ -87,6 +94,8 @@ class Change:
             f"{name} with its sign turned" for name in self.mirrored if name not in dict(self.drives)
         ]
         statements += [f"{name} as {level} as its limits allow" for name, level in self.levels]
+        if self.rows > 1:
+            statements.append(f"recorded with rows {self.rows} times as dense")
         statements += [f"{key}: {value}" for key, value in self.conditions]
         return tuple(statements)
 
@@ -142,7 +151,7 @@ def _source(run: Run, name: str, names: Sequence[str]) -> str | None:
 
 def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
     """Return the recording as changed; None where an input leaves what it may reach, or is too fast."""
-    run = next(run for run in problem.runs if run.name == change.run)
+    run = refined(next(run for run in problem.runs if run.name == change.run), change.rows)
     # Faster inputs come again within the same time, there and back.
     span = run.t[-1] - run.t[0]
     phase = np.mod((run.t - run.t[0]) * change.rate / span, 2.0) if span > 0 else np.zeros(run.rows)
@@ -161,7 +170,7 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
             if source is None:
                 ends = _ends(low, high, sizes.get(name, 1.0), levels.get(name))
                 pace = _pace(problem, name, sources, limits).told_by_rows(
-                    float(np.median(np.diff(run.t))), _BETWEEN_ROWS * (high - low)
+                    row_step(run), _BETWEEN_ROWS * (high - low)
                 )
                 start = min(max(float(column[0]), low), high)
                 column = driven(run.t, drives[name], start, ends, pace)
@@ -190,6 +199,15 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
         run, name="next.csv", t=run.t + later, columns=columns,
         conditions=unchanged | dict(change.conditions), declared={**run.declared, **dict(change.conditions)},
     )  # fmt: skip
+
+
+def densities(run: Run, limits: RunLimits) -> tuple[int, ...]:
+    """Return how many rows may be recorded for each row of a recording: 1, 2, 4 and so on."""
+    return tuple(
+        2**power
+        for power in range(_DOUBLINGS + 1)
+        if power == 0 or row_step(run) >= 2**power * limits.step_s * (1 - _SLACK)
+    )
 
 
 def _depths(sources: Mapping[str, str | None]) -> dict[str, int]:

@@ -1,23 +1,22 @@
 """What of a budget hangs on the slip angles, for many designs at once: what an exchange goes by.
 
 A reading moves with the parameters of its curves by a gradient g, and these with the conditions by J^+, so
-that conditions of variances s² leave (g J^+)² s² of it (`characteristics.reading`). All else in the budget,
-what all rows share, stays as it is whatever the slip angles. The gradient is taken by moving a curve's
+that conditions of variances s² leave (g J^+)² s² of it (`characteristics.reading`). What the form of the
+curves misses at a slip angle moves both sides and directions together: it adds up before it is squared. All
+else in the budget stays as it is whatever the slip angles. The gradient is taken by moving a curve's
 parameters and letting the catalogue read again: no formula of a characteristic stands here. A design that
 comes out of the exchange is judged by the whole budget (`expectation`), not by this.
 
 Derivatives hold near the curves of the earlier test. A design that leaves a curve open between its slip
-angles is none, however well it tells what is demanded: the curve of the test may go elsewhere there, and
-what is read off it has another U.
+angles is none: the curve of the test may go elsewhere there, and what is read off it has another U.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +37,7 @@ _STEP = 1e-4  # of a parameter's size
 _NO_DATA = 1e-8
 _COVERAGE = 1.96
 _POWER = 16
-# The standard uncertainty of a curve, anywhere in its range, at most: in that of a condition there, or of
-# what the design of every candidate leaves there, which no other design makes smaller.
-_OPEN = 2.0
+_OPEN = 2.0  # u of a curve at most, in that of a condition there, or of what every candidate together leaves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,28 +45,34 @@ class Screen:
     """Demands on the curves of a list of candidate slip angles.
 
     ``tangents`` (curves, candidates, parameters), scaled, and ``variances`` (curves, candidates) of their
-    conditions; ``closed`` (curves, candidates) the variances of a curve that no slip angle leaves open;
-    ``gradients`` (readings, curves, parameters) in the same scale; ``fixed`` (readings,) the
-    variances that stay, ``limits`` (readings,) of the expanded uncertainty.
+    conditions; ``forms`` (sources, curves, candidates) the standard deviations of what their form misses, one
+    error at all candidates of one of ``places`` (candidates,); ``own`` (readings, curves, candidates) marks
+    where a reading is the tire's value; ``closed`` (curves, candidates) the variances of a curve that nothing
+    leaves open; ``gradients`` (readings, curves, parameters) in the scale of the tangents; ``fixed``
+    (readings,) the variances that stay, ``limits`` (readings,) of the expanded uncertainty.
     """
 
     tangents: Array
     variances: Array
+    forms: Array
+    places: NDArray[np.intp]
+    own: Array
     closed: Array
     gradients: Array
     fixed: Array
     limits: Array
 
     def ratios(self, designs: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return U of each reading over its limit (designs, readings), and how open each curve is between
-        its slip angles over what is allowed (designs, curves).
-
-        ``designs`` (designs, points) are candidates by their numbers.
+        """Return of designs (designs, points), candidates by their numbers, U of each reading over its limit
+        (designs, readings), and how open each curve is between over what is allowed (designs, curves).
         """
         pseudo = np.asarray(np.linalg.pinv(self.tangents[:, designs], rcond=_NO_DATA), dtype=np.float64)
-
         weights = np.einsum("rcp,cdpn->drcn", self.gradients, pseudo)
         own = np.einsum("drcn,cdn->dr", weights**2, self.variances[:, designs])
+        missed = weights - np.moveaxis(self.own[:, :, designs], 2, 0)
+        missed = np.einsum("drcn,scdn->drsn", missed, self.forms[:, :, designs])
+        places = self.places[designs]
+        own += np.einsum("drsn,dnm,drsm->dr", missed, places[:, :, None] == places[:, None], missed)
         curves = _between(self.tangents, pseudo, self.variances[:, designs]) / self.closed
         return _COVERAGE * np.sqrt(self.fixed + own) / self.limits, np.sqrt(curves.max(axis=2)) / _OPEN
 
@@ -102,7 +105,7 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
     """
     directions, scatter = earlier.foreseen(full)
     places: dict[tuple[float, str, str], int] = {}
-    tangents, variances, scales = [], [], []
+    tangents, variances, scales, forms = [], [], [], []
     for direction in directions:
         for channel in CHANNELS:
             fit = _fit(direction, channel)
@@ -114,19 +117,28 @@ def screen_of(earlier: EarlierTest, full: Design, reaches: Sequence[Reach]) -> S
             tangents.append(jacobian * scale)
             scales.append(scale)
             variances.append(direction.group.own_u(channel) ** 2 + scatter.each(direction, channel))
+            forms.append(scatter.forms(direction, channel))
     gradients = np.zeros((len(reaches), len(tangents), len(scales[0])))
+    read = np.zeros((len(reaches), len(tangents), len(full.slip_angles_rad)))
     for row, reach in enumerate(reaches):
         demand = reach.demand
         for curve, gradient in _gradients(
             earlier, full.slip_angles_rad, demand.characteristic, reach.load_N, reach.rotation, reach.SA_rad
         ):
             gradients[row, places[curve]] = gradient * scales[places[curve]]
+        if reach.SA_rad is not None:
+            at_load = earlier.curves[reach.load_N, "forward"].fit.load_N
+            curve = at_load, reach.rotation, by_name()[demand.characteristic].channel
+            read[row, places[curve]] = np.isclose(np.sort(full.slip_angles_rad), reach.SA_rad)
     fixed = [sum(u * u for source, u in reach.sources if source not in _OWN) for reach in reaches]
     every, own = np.array(tangents), np.array(variances)
     pseudo = np.asarray(np.linalg.pinv(every, rcond=_NO_DATA), dtype=np.float64)
     return Screen(
         tangents=every,
         variances=own,
+        forms=np.stack(forms, axis=1),
+        places=np.unique(np.abs(np.round(full.slip_angles_rad, 9)), return_inverse=True)[1].ravel(),
+        own=read,
         closed=np.maximum(own, _between(every, pseudo[:, None], own[:, None])[0]),
         gradients=gradients,
         fixed=np.array(fixed),
@@ -160,7 +172,7 @@ def _gradients(
     directions: dict[str, Direction] = {each.group.rotation: each for each in earlier.directions(design)}
     at = () if SA_rad is None else (SA_rad,)
     # Of the value alone: what the rows share is not asked for.
-    shared = dataclasses.replace(earlier.shared, record=None)
+    shared = replace(earlier.shared, record=None)
     still = [Reader(directions[run], shared=shared, stepped=False) for run in runs]
 
     def value(place: int, fit: DirectionFit) -> float:
@@ -170,22 +182,17 @@ def _gradients(
 
     found = []
     for place, reader in enumerate(still):
-        direction = reader.direction
+        direction, curves = reader.direction, reader.direction.fit
         for channel in CHANNELS:
-            fit = _fit(direction, channel)
-            slopes = []
+            fit, slopes = _fit(direction, channel), []
             for i, parameter in enumerate(fit.parameters):
                 step = _STEP * max(abs(parameter.value), 1e-3)
                 ends = []
                 for sign in (1.0, -1.0):
                     values = list(fit.parameters)
-                    values[i] = dataclasses.replace(parameter, value=parameter.value + sign * step)
-                    changed = dataclasses.replace(fit, parameters=tuple(values))
-                    moved = (
-                        dataclasses.replace(direction.fit, FY=changed)
-                        if channel == "FY"
-                        else dataclasses.replace(direction.fit, MZ=changed)
-                    )
+                    values[i] = replace(parameter, value=parameter.value + sign * step)
+                    changed = replace(fit, parameters=tuple(values))
+                    moved = replace(curves, FY=changed) if channel == "FY" else replace(curves, MZ=changed)
                     ends.append(value(place, moved))
                 slopes.append((ends[0] - ends[1]) / (2 * step))
             found.append(((direction.group.load_N, direction.group.rotation, channel), np.array(slopes)))

@@ -91,7 +91,8 @@ class Case:
     ``effects`` are those that its simulation has from the start, of a model file or a corrected machine;
     ``model`` is that file; ``nominal_load_N`` the load to which their parameters are counted, None for that
     of the recordings; ``simulated`` says that these are no recordings of a real machine; ``has_order``
-    that their rows follow each other, and are no set of readings.
+    that their rows follow each other, and are no set of readings; ``sample_rate_Hz`` the highest at which
+    they can be recorded, None where nothing is said of it.
     """
 
     path: Path
@@ -108,6 +109,7 @@ class Case:
     nominal_load_N: float | None = None
     model: Path | None = None
     simulated: bool = False
+    sample_rate_Hz: float | None = None
     has_order: bool = True
 
     @property

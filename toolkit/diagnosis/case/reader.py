@@ -12,7 +12,20 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from toolkit.channels import Axes
-from toolkit.declared import Entry, Fault, Format, Keyed, Size, Source, Text, build, nearest, refuse
+from toolkit.declared import (
+    Above,
+    Entry,
+    Fault,
+    Format,
+    Keyed,
+    Size,
+    Source,
+    Text,
+    Unit,
+    build,
+    nearest,
+    refuse,
+)
 from toolkit.diagnosis.case.case import Case, CaseChannel, Run, Simulation
 from toolkit.diagnosis.case.recordings import read_run
 from toolkit.diagnosis.case.repeats import is_copy, repeated_runs
@@ -85,6 +98,7 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
         nominal_load_N=None if model_file is None else model_file.nominal_load_N,
         model=model_path,
         simulated=recording.simulated,
+        sample_rate_Hz=recording.sample_rate_Hz,
     )
 
 
@@ -166,6 +180,11 @@ class Recording:
     simulated: Annotated[
         bool, Entry("the recordings are simulated as well: every answer says so", example=True)
     ] = False
+    sample_rate_Hz: Annotated[
+        float | None, Unit("Hz"), Above(0),
+        Entry("highest that can be recorded: plans may ask for rows as dense", key="sample_rate",
+              example={"value": 200, "unit": "Hz"}),
+    ] = None  # fmt: skip
     channels: Annotated[
         tuple[CaseChannel, ...], Keyed(by="name"),
         Entry("every column that is used", example={

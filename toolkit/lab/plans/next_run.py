@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.simulators.simulator import Output
     from toolkit.planning.members import Member
-    from toolkit.planning.next_run import NextRun
+    from toolkit.planning.next_run import NextRun, RunSearch
     from toolkit.planning.run_changes import RunLimits
     from toolkit.report.content import Plot
     from toolkit.report.word.package import Template
@@ -48,6 +48,7 @@ class PlanNextAnswer(NextRunPlan):
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
+_SLACK = 1e-3  # of a rate: times of rows are printed
 _PLAIN, _APART = re.compile(r"[A-Za-z0-9_]{1,40}"), "_apart"
 
 
@@ -58,6 +59,7 @@ def plan_next(
     case: Path | None = None,
     limits: Sequence[str] = (),
     rates: Sequence[str] = (),
+    sample_rate_Hz: float | None = None,
     budget_s: float = 60.0,
     calibrations: Path | None = None,
     home: Path | None = None,
@@ -79,7 +81,7 @@ def plan_next(
     Raises
     ------
     ConfigError
-        ``plan-next``: no class, a case that is another one, no run that can be made;
+        ``plan-next``: no class, a case that is another one, no run that can be made, or rows;
         ``plan-infeasible``: no run stays within the limits, with the nearest limits that one keeps
     """
     from datetime import date
@@ -111,6 +113,7 @@ def plan_next(
             code.until = time.monotonic() + 10 * budget_s
         problem = problem_of(read, model_of(read, registry, code))
         reach = _limits(limits, rates, read)
+        reach = dataclasses.replace(reach, step_s=_least_step(sample_rate_Hz, problem))
         tell("the members of the class")
         members = members_of(problem, diagnosis.effects, effect)
         tell("runs")
@@ -126,12 +129,15 @@ def plan_next(
         # A repeat was made once: limits of the next run are none of it.
         recorded = dataclasses.replace(search, limits=RunLimits(), judged={}, runs={}) if reach else search
         repeat = recorded.judge(Change(run=best.run))
+        stays = chosen is not None and len(chosen.together) * 2 == len(chosen.pairs)
+        complete = time.monotonic() < ends
+        longer = time.monotonic() + budget_s / 3
+        denser = _denser(search, lambda: time.monotonic() < longer) if stays else None
     if chosen is None or repeat is None:
         raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
                      "look at the case's simulation")  # fmt: skip
-    complete = time.monotonic() < ends
-    if len(chosen.together) * 2 == len(chosen.pairs):
-        raise _nothing_parts(chosen, effect, complete=complete)
+    if stays:
+        raise _nothing_parts(chosen, effect, denser, complete=complete)
     driven = [name for name, _ in movable(problem, reach)]
     plan = _plan(read, diagnosis.effects, members, chosen, repeat, driven, len(search.judged), complete)
     answer = extended(PlanNextAnswer, plan, out=out)
@@ -202,6 +208,47 @@ def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits
     )
 
 
+def _least_step(sample_rate_Hz: float | None, problem: Problem) -> float:
+    """Return the least time from row to row [s] that can be recorded: as it was, where nothing is said of it.
+
+    Raises
+    ------
+    ConfigError
+        ``plan-next``: the case has no time, or its recordings are denser
+    """
+    from toolkit.machine import load_machine
+    from toolkit.planning.members import row_step
+
+    case = problem.case
+    stated = case.sample_rate_Hz if sample_rate_Hz is None else sample_rate_Hz
+    where = str(case.path) if sample_rate_Hz is None else "--sample-rate"
+    recorded = 1 / min(row_step(run) for run in problem.runs) if case.has_time else math.inf
+    if stated is None:
+        machine = load_machine(case.simulation.machine) if case.simulation.kind == "machine" else None
+        return 1 / ((machine and machine.sample_rate_Hz) or recorded)
+    if not stated >= recorded * (1 - _SLACK):
+        raise _wrong(
+            "rows cannot be recorded so seldom", where, f"sample rate {stated:g} Hz",
+            f"{recorded:.6g} Hz at least, as recorded" if case.has_time else "a case with a time",
+            "leave the sample rate out, or state what can be recorded",
+        )  # fmt: skip
+    return 1 / stated
+
+
+def _denser(search: RunSearch, until: Callable[[], bool]) -> tuple[float, NextRun] | None:
+    """Return the rate of rows [Hz] beyond what is stated at which a run would part a pair, and that run."""
+    from toolkit.planning.members import row_step
+
+    if not search.problem.case.has_time:
+        return None
+    limits = dataclasses.replace(search.limits, step_s=0.0)
+    wider = dataclasses.replace(search, limits=limits, judged={}, runs={}, dense={}, until=until)
+    chosen = wider.judge(wider.best())
+    if chosen is None or len(chosen.together) * 2 == len(chosen.pairs):
+        return None
+    return 1 / row_step(chosen.run), chosen
+
+
 def _plan(
     case: Case,
     effects: Sequence[Any],
@@ -247,9 +294,11 @@ def _plan(
 def _ranges(case: Case, run: Run, driven: Sequence[str]) -> list[str]:
     """Return how far and how fast each input of a run goes, for who drives the machine."""
     from toolkit.planning.drives import fastest
+    from toolkit.planning.members import row_step
 
     units = {channel.name: channel.unit.replace("*", "·") for channel in case.channels}
-    return [
+    every = [f"a row every {row_step(run):.4g} s"] if case.has_time else []
+    return every + [
         f"{name} from {column.min():.4g} to {column.max():.4g} {units[name]}"
         + (f", at most {rate:.3g} {units[name]} a second" if case.has_time and rate else "")
         for name, column in ((name, run.columns[name]) for name in driven)
@@ -379,18 +428,28 @@ def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
 
 
-def _nothing_parts(chosen: NextRun, effect: DiagnosedEffect, *, complete: bool) -> ConfigError:
+def _nothing_parts(
+    chosen: NextRun, effect: DiagnosedEffect, denser: tuple[float, NextRun] | None, *, complete: bool
+) -> ConfigError:
     """Return the error of a class that no run within the limits parts, with what would."""
     from toolkit.diagnosis.answer.next_measurements import apart
     from toolkit.diagnosis.policy import VERDICT
 
     most = max(0.0, *(gain for _, _, gain in chosen.pairs))
-    longer = "" if complete else "search longer with --budget, "
+    steps = [] if complete else ["search longer with --budget"]
+    steps.append("allow more")
+    nearest = "; ".join(chosen.change.words())
+    if denser is not None:
+        rate, parting = math.ceil(denser[0] * (1 - 1e-6)), denser[1]
+        nearest = (
+            f"{'; '.join(parting.change.words())}, which names the true one in {100 * parting.power:.0f} %"
+        )
+        steps.append(f"--sample-rate {rate} where rows can be recorded so densely")
     return ConfigError(
         "no run within the limits parts the class", where="--limit, --rate",
         got=f"{' and '.join((effect.name, *effect.equivalent_to))}: expected log-evidence {most:.2g}",
-        expected=f"more than {VERDICT.close:g}; nearest: {'; '.join(chosen.change.words())}",
-        next_step=f"{longer}allow more, record denser rows, or measure by itself: {apart(effect)}",
+        expected=f"more than {VERDICT.close:g}; nearest: {nearest}",
+        next_step=f"{', '.join(steps)}, or measure by itself: {apart(effect)}",
         rule="plan-infeasible",
     )  # fmt: skip
 
