@@ -7,17 +7,17 @@ explain.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolkit.diagnosis.fit.fit import fit, sizes_off
-from toolkit.diagnosis.fit.folds import hold_out
+from toolkit.diagnosis.fit.folds import hold_out, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import before_nothing
-from toolkit.diagnosis.law.learn import Laws, learned
+from toolkit.diagnosis.law.learn import Law, Laws, learned
 from toolkit.diagnosis.policy import LAWS, STEP, VERDICT
 from toolkit.diagnosis.search.superfluous import without
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
@@ -103,17 +103,38 @@ def least_share(named: Fit, laws: Fit, least: float = LAWS.same) -> float:
 
 
 def _does_with_fewer(search: Search, alone: Laws) -> bool:
-    """Tell whether laws do better with fewer terms and fewer parameters than all effects together.
+    """Tell whether the first laws do better with fewer terms and fewer parameters than all effects together.
 
     A law may be one effect's own formula, with a size more or less. It is not that of two: these imitate it
-    together, however much of it they take. Better is a higher held-out score, and no output with more error.
+    together, however much of it they take. Better is a higher held-out score, and less error on unseen rows
+    over all outputs. What laws further mend is no matter of the effects.
     """
-    return (
-        len(alone.listed) < len(_effects(search))
-        and parameters_of(alone.fit) < parameters_of(search.augmented)
-        and alone.held_out.total - search.held_augmented.total >= STEP.least_gain
-        and _foretell_no_worse(search, alone)
+    problem, most = search.problem, len(_effects(search)) - 1
+    first: list[AppliedEffect] = []
+    for law in _whole(alone.listed)[:most]:
+        added = [*first, *(each.applied for each in law.together)]
+        if _searched(added) >= parameters_of(search.augmented):
+            break
+        first = added
+    if not first:
+        return False
+    held_out = alone.held_out
+    if len(first) < len(alone.fit.active):
+        try:
+            made = fit(problem, first, start=alone.fit.p)
+            held_out = hold_out(problem, search.folds, made.active, made)
+        except FitError:
+            return False
+    gain = held_out.total - search.held_augmented.total
+    return gain >= STEP.least_gain and unseen_error(problem, held_out) < unseen_error(
+        problem, search.held_augmented
     )
+
+
+def _whole(listed: Sequence[Law]) -> list[Law]:
+    """Return the laws of which others are the counterparts, and those without any."""
+    counterparts = {id(each) for law in listed for each in law.together[1:]}
+    return [law for law in listed if id(law) not in counterparts and law.predicts]
 
 
 def _foretell_no_worse(search: Search, alone: Laws) -> bool:
@@ -256,7 +277,11 @@ def take_as_much(
 
 def parameters_of(fit: Fit) -> int:
     """Return how many parameters of effects and laws a fit has searched."""
-    return sum(len(applied.searched) for applied in fit.active)
+    return _searched(fit.active)
+
+
+def _searched(active: Sequence[AppliedEffect]) -> int:
+    return sum(len(applied.searched) for applied in active)
 
 
 def without_imitations(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
