@@ -75,9 +75,10 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
         search.problem, search.held_refitted, search.held_augmented, alone.held_out,
         least=least_share(search.augmented, alone.fit, least),
     )  # fmt: skip
-    if alike and not _does_with_fewer(search, alone):
+    fewer = _does_with_fewer(search, alone)
+    if alike and not fewer:
         return search, laws
-    if any(_holds_beside(laws, step) for step in search.steps):
+    if not fewer and any(_holds_beside(laws, step) for step in search.steps):
         more = parameters_of(alone.fit) - parameters_of(laws.fit)
         beside_laws = laws.held_out if predicting else search.held_augmented
         # Of as many parameters it has to be better, of fewer no worse.
