@@ -114,3 +114,19 @@ def test_the_answer_says_which_runs_start_elsewhere_and_lists_no_start_as_a_para
         assert float(value) == pytest.approx(by, abs=0.05)
         assert unit == "rad/s"
     assert [each.name for each in answer.nominal_parameters] == ["w2", "c"]
+
+
+def test_the_simulation_as_declared_starts_where_it_is_said_to(answered):
+    """Its error is that of the case's own file, solved by scipy from the rows as they were read."""
+    answer, _ = answered
+    squares = []
+    for seed in (0, 1):
+        frame, _ = swing(seed, late=True)
+        t, start = frame["t"].to_numpy(), [frame["angle"][0], frame["rate"][0]]
+        solved = solve_ivp(
+            lambda _, x: [x[1], -40 * np.sin(x[0]) - 0.1 * x[1]], (0, t[-1]), start, t_eval=t, rtol=1e-9,
+            atol=1e-10,
+        )  # fmt: skip
+        squares.append((frame["angle"] - solved.y[0]) ** 2)
+    (held_out,) = answer.fit.held_out
+    assert held_out.nominal_rmse == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-4)

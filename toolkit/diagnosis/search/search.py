@@ -168,7 +168,8 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
     budget.check("where the runs start")
     problem = with_run_starts(problem, refitted)
     if problem.starts:
-        nominal, refitted = _as_declared(problem), fit(problem, start=problem.begun(refitted.p))
+        nominal = replace(nominal, p=(*nominal.p, *(0.0 for _ in problem.starts)))
+        refitted = fit(problem, start=problem.begun(refitted.p))
     folds = folds_of(problem, refitted)
     found = _searched(problem, folds, nominal, refitted, seed, budget)
     weighed = weighed_as_mismatch(problem, refitted)
