@@ -54,10 +54,13 @@ def test_no_published_size_is_odd(tmp_path: Path, tire: str) -> None:
         ({"angle": np.pi / 180}, "FY"),  # radians named deg
         ({"angle": 3.0, "header": HEADER.replace("deg", "rad")}, None),  # 30 rad: refused before
         ({"angle": 0.3, "header": HEADER.replace("deg", "rad")}, "FY"),  # deg named rad, within half a turn
-        ({"force": 1e-3, "moment": 1e-3}, "FY"),  # kN named N
+        ({"force": 1e-3, "moment": 1e-3}, "friction, FY"),  # kN named N
         ({"force": 30.0, "moment": 30.0}, "FY"),
         ({"moment": 1e3}, "MZ"),  # N·mm named N·m
-        ({"moment": 1.0, "force": 0.2248}, ""),  # pounds named newtons: within the range of tires, not seen
+        (
+            {"moment": 1.0, "force": 0.2248},
+            "friction",
+        ),  # pounds named newtons: a stiffness within the range of tires
     ],
 )
 def test_a_wrong_unit_shows_in_the_size_of_a_stiffness(
@@ -68,8 +71,13 @@ def test_a_wrong_unit_shows_in_the_size_of_a_stiffness(
         with pytest.raises(Exception, match="no tire has such a value"):
             findings(path, "bicycle", **wrong)
         return
-    expected = [("implausible-stiffness", f"t.csv, {channels}")] if channels else []
-    assert findings(path, "bicycle", **wrong) == expected
+    told = findings(path, "bicycle", **wrong)
+    stiff = [channel for channel in channels.split(", ") if channel != "friction"]
+    assert [where for rule, where in told if rule == "implausible-stiffness"] == [
+        f"t.csv, {x}" for x in stiff
+    ]
+    assert any(rule == "implausible-friction" for rule, _ in told) is ("friction" in channels)
+    assert {rule for rule, _ in told} <= {"implausible-stiffness", "implausible-friction"}
 
 
 def test_a_slope_that_the_data_do_not_determine_is_not_judged(tmp_path: Path) -> None:
