@@ -19,7 +19,6 @@ from typing import Any
 import pytest
 from _pytest.doctest import DoctestModule
 from hypothesis import settings
-from hypothesis.internal.conjecture import providers
 
 from tests.built_once import built_once, common_folder
 from tests.declared_answers import hold_to_declarations
@@ -37,10 +36,6 @@ from toolkit.worker import posix
 # machine draws new ones each time, so that fewer than the usual hundred a run add up.
 settings.register_profile("toolkit", deadline=None, max_examples=40, derandomize=bool(os.environ.get("CI")))
 settings.load_profile("toolkit")
-# Among its examples are the constants of the code under test. Those of the tests are left out: to read them
-# costs every worker two seconds, and a new test would draw other examples for all others.
-_is_local = providers.is_local_module_file
-providers.is_local_module_file = lambda path: "/tests/" not in path and _is_local(path)
 hold_to_declarations()
 
 # A case's worker is forked where no thread holds a lock that it may want. The runner's own thread waits for

@@ -110,7 +110,7 @@ def test_the_answer_says_which_runs_start_elsewhere_and_lists_no_start_as_a_para
     told = [finding for finding in answer.findings if finding.rule == "run-starts"]
     assert [finding.where.split(": ")[1] for finding in told] == ["r0.csv", "r1.csv"]
     for finding, by in zip(told, off, strict=True):
-        value, unit = finding.message.split("rate ")[1].split(" ")
+        value, unit = finding.message.split("rate by ")[1].split(" ")
         assert float(value) == pytest.approx(by, abs=0.05)
         assert unit == "rad/s"
     assert [each.name for each in answer.nominal_parameters] == ["w2", "c"]

@@ -10,7 +10,7 @@ import pytest
 
 from tests.diagnosis.case_text import case_text
 from tests.diagnosis.cases import carriage, write_case
-from toolkit.diagnosis.answer.answer import Dependence, RejectedEffect
+from toolkit.diagnosis.answer.answer import Dependence, DiagnosedLaw, LawEvidence, LawPlace, RejectedEffect
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.diagnose import diagnose
 from toolkit.diagnosis.fit.sensor_noise import ChannelNoise
@@ -293,6 +293,28 @@ def test_the_first_line_says_how_large_is_what_has_no_name(dragged, skipped):
     old = dataclasses.replace(house, spread=None)
     answer = dataclasses.replace(answer, fit=dataclasses.replace(answer.fit, held_out=(old,)))
     assert "off by" not in headline(answer)
+
+
+def test_the_first_line_says_where_a_law_of_several_equations_is(dragged):
+    """A rod that gives heat to the room does so along all of its length; the second law is another."""
+    together = LawEvidence(held_out_log_score_gain=229.0, p_value=1e-9, share_of_gap=0.97)
+    place = LawPlace(kind="state", channel="T2")
+    law = DiagnosedLaw(
+        place=place, form="static", acts="adds", variables=("T2", "Troom"), memory_s=None,
+        formula="a*(T2 - Troom)",
+        parameters=(), curve=None, ranges=(), resembles=(), confounded_with=(), evidence=together,
+    )  # fmt: skip
+    other = dataclasses.replace(together, share_of_gap=0.5)
+    laws = (
+        law,
+        *(dataclasses.replace(law, place=LawPlace(kind="state", channel=name)) for name in ("T3", "T4")),
+        dataclasses.replace(law, place=LawPlace(kind="state", channel="T6"), evidence=other),
+    )
+    answer = dataclasses.replace(dragged.diagnosis, verdict="unknown", effects=(), laws=laws)
+    told = "in the equation of T2: dT2/dt = ... + a*(T2 - Troom); with it laws in the equations of T3, T4."
+    assert headline(answer).endswith(f"Its law was learned: {told}")
+    answer = dataclasses.replace(answer, laws=laws[::3])
+    assert headline(answer).endswith(f"Its law was learned: {told.partition(';')[0]}.")
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,7 @@ def expanded_of_rows(
         the record has no such load
     """
     fitted = _fitted(record, load)
-    scatter = scatter_of(record, loads, fitted)
+    scatter, statements = scatter_of(record, loads, fitted), statements_of(record)
     U = np.full(len(indications), np.nan)
     for start in range(0, len(indications), _AT_A_TIME):
         points = indications[start : start + _AT_A_TIME]
@@ -149,9 +149,11 @@ def expanded_of_rows(
         values = term_matrix(fitted.terms, columns) @ np.asarray(fitted.coefficients)
         finite = np.isfinite(values)
         if finite.any():
-            U[start : start + _AT_A_TIME][finite] = _Budgets.at(
-                record, loads, check, fitted, values[finite], points[finite], None, PROBABILITY, scatter
-            ).U
+            parts, scatter_dof = components_of(
+                record, statements, loads, check, fitted, values=values[finite], points=points[finite],
+                temperature=None, scatter=scatter,
+            )  # fmt: skip
+            U[start : start + _AT_A_TIME][finite] = _combined(parts, scatter_dof, PROBABILITY)[3]
         if step is not None:
             step(start + len(points))
     return U
@@ -171,39 +173,13 @@ def typical_indications(record: CalibrationRecord, loads: Table, load: str, at: 
     return point
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Budgets:
-    """Budgets of one load at many points: ``u``, ``dof``, ``k`` and ``U`` (points,)."""
-
-    contributions: tuple[Contribution, ...]
-    scatter_dof: Array
-    u: Array
-    dof: Array
-    k: Array
-    U: Array
-
-    @classmethod
-    def at(
-        cls,
-        record: CalibrationRecord,
-        loads: Table,
-        check: Table | None,
-        load: LoadFit,
-        values: Array,
-        points: Array,
-        temperature: Temperature | None,
-        probability: float,
-        scatter: Scatter,
-    ) -> _Budgets:
-        """Return the budgets: JCGM 100 eq. 10, G.2b and G.6.4."""
-        parts, scatter_dof = components_of(
-            record, statements_of(record), loads, check, load, values=values, points=points,
-            temperature=temperature, scatter=scatter,
-        )  # fmt: skip
-        joint = np.sqrt(np.asarray(sum(part.u**2 for part in parts if part.joint)))
-        apart = [(part.u, part.dof) for part in parts if not part.joint]
-        u, dof, k, U = combine([(joint, scatter_dof), *apart], probability)
-        return cls(contributions=parts, scatter_dof=scatter_dof, u=u, dof=dof, k=k, U=U)
+def _combined(
+    parts: Sequence[Contribution], scatter_dof: Array, probability: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return (u, dof, k, U) of a budget's components at many points."""
+    joint = np.sqrt(np.asarray(sum(part.u**2 for part in parts if part.joint)))
+    apart = [(part.u, part.dof) for part in parts if not part.joint]
+    return combine([(joint, scatter_dof), *apart], probability)
 
 
 def combine(
@@ -227,17 +203,15 @@ def _budget(
     probability: float,
     scatter: Scatter | None = None,
 ) -> Budget:
-    budgets = _Budgets.at(
-        record, loads, check, load, np.array([value]), point[None], temperature, probability,
-        scatter or scatter_of(record, loads, load),
+    parts, scatter_dof = components_of(
+        record, statements_of(record), loads, check, load, values=np.array([value]), points=point[None],
+        temperature=temperature, scatter=scatter or scatter_of(record, loads, load),
     )  # fmt: skip
-    u, dof, k, U, scatter_dof = (
-        values.item() for values in (budgets.u, budgets.dof, budgets.k, budgets.U, budgets.scatter_dof)
-    )
+    u, dof, k, U = (values.item() for values in _combined(parts, scatter_dof, probability))
     return Budget(
         record=record.id, load=load.load, unit=load.unit, at=value, indications=tuple(point.tolist()),
-        components=tuple(part.at(0) for part in budgets.contributions), u=u, dof=dof, k=k, U=U,
-        probability=probability, scatter_dof=scatter_dof,
+        components=tuple(part.at(0) for part in parts), u=u, dof=dof, k=k, U=U,
+        probability=probability, scatter_dof=scatter_dof.item(),
     )  # fmt: skip
 
 

@@ -99,13 +99,13 @@ def _started(case: Case, search: Search) -> tuple[Finding, ...]:
     for parameter, value in zip(search.problem.free, search.augmented.p, strict=True):
         if isinstance(parameter, RunStart) and abs(value) > PRIORS.far * parameter.sd:
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            by_run.setdefault(parameter.run_name, []).append(f"{parameter.state} {value:+.3g}{unit}")
+            by_run.setdefault(parameter.run_name, []).append(f"{parameter.state} by {value:+.3g}{unit}")
     return tuple(
         Finding(
             rule="run-starts",
             where=f"{case.path.name}: {run}",
             level="warning",
-            message=f"by its own rows the run starts off where `initial` puts it: {', '.join(off)}",
+            message=f"led along its rows the run starts elsewhere than `initial` puts it: {', '.join(off)}",
         )
         for run, off in by_run.items()
     )

@@ -92,6 +92,13 @@ def provisional(diagnosis: Diagnosis) -> str | None:
     return f"Provisional: the budget was spent before all tests of these names were made ({steps[0]})."
 
 
+def _first_law(diagnosis: Diagnosis) -> str:
+    """Return the first law, and where those are that were learned and judged as one with it."""
+    first, *others = diagnosis.laws
+    alike = [law.place.channel for law in others if law.evidence == first.evidence]
+    return first.sentence + (f"; with it laws in the equations of {', '.join(alike)}" if alike else "")
+
+
 def _verdict(diagnosis: Diagnosis) -> str:
     """Return the verdict as a sentence: no more than the sizes of its effects bear out."""
     from toolkit.diagnosis.answer.answer import cut_short, only_runs_differ
@@ -107,11 +114,11 @@ def _verdict(diagnosis: Diagnosis) -> str:
         missing = f"{HEADLINES['unknown'].removesuffix('.')}{_size(diagnosis)}."
         if not diagnosis.laws:
             return missing
-        return f"{missing} Its law was learned: {diagnosis.laws[0].sentence}."
+        return f"{missing} Its law was learned: {_first_law(diagnosis)}."
     if diagnosis.verdict == "named" and not any(map(is_told_from_none, diagnosis.effects)):
         return "A known effect may explain the mismatch; none of its sizes is told from none."
     if diagnosis.effects and diagnosis.remaining == "unknown" and diagnosis.laws:
-        return f"{HEADLINES[diagnosis.verdict]} What is left follows a law: {diagnosis.laws[0].sentence}."
+        return f"{HEADLINES[diagnosis.verdict]} What is left follows a law: {_first_law(diagnosis)}."
     if diagnosis.effects and diagnosis.remaining == "unknown":
         # Who reads the first line alone must not take a name for the whole of it.
         return f"{HEADLINES[diagnosis.verdict]} More is left that no known effect explains{_size(diagnosis)}."
