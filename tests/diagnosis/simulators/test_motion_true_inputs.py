@@ -54,3 +54,24 @@ def test_a_mirrored_sensor_leaves_a_force_as_it_is(
     assert np.ptp(as_mounted - without) > 0.01
     turned_round = model.simulate(case.runs[1], {"c": 2.0}, (sign, acting))["F"]
     np.testing.assert_allclose(turned_round, as_mounted, rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("unit", "has_a_place"), [("N", True), ("N*m", True), ("A", True), ("mA", True), ("V", False)]
+)
+def test_friction_is_missing_in_what_a_drive_exerts_or_takes_to_exert_it(
+    tmp_path: Path, unit: str, has_a_place: bool
+) -> None:
+    """A motor's current is the commonest measure of its torque; a voltage may be anything's."""
+    t = np.arange(300) * 0.01
+    recorded = pd.DataFrame({"t": t, "v": np.sin(5.0 * t), "F": np.zeros(300)})
+    text = case_text(
+        "python",
+        parameters={"c": (2.0, f"{unit}*s/m", 0.5)},
+        inputs={"v": "m/s"},
+        outputs={"F": unit},
+        runs=1,
+    )
+    case = read_case(write_case(tmp_path, text, simulator=DASHPOT, r0__csv=recorded))
+    listed = candidates(problem_of(case, model_of(case, None, None)))
+    assert any(each.name == "coulomb_friction" for each in listed) is has_a_place

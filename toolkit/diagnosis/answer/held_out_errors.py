@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import HeldOutChannel
-from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts
+from toolkit.diagnosis.fit.sensor_noise import judged_noise
 from toolkit.diagnosis.fit.structure import RUNS, groups
 from toolkit.diagnosis.law.trial import bracketed
 from toolkit.diagnosis.search.search import Search
@@ -17,7 +17,9 @@ from toolkit.diagnosis.simulators.parameter_units import reduced
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
+    from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.law.learn import Laws
+    from toolkit.diagnosis.simulators.simulator import Output
 
 
 def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutChannel, ...]:
@@ -41,7 +43,7 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutChannel, .
         errors.append(
             HeldOutChannel(
                 channel=output.name,
-                unit=reduced(f"{bracketed(output.unit)}/s") if output.name in problem.rates else output.unit,
+                unit=judged_unit(problem, output),
                 nominal_rmse=rmse(search.nominal.simulated[output.name]),
                 refitted_rmse=rmse(search.held_refitted.simulated[output.name]),
                 augmented_rmse=rmse(augmented.simulated[output.name]),
@@ -50,21 +52,16 @@ def held_out_errors(search: Search, *, unknown: bool) -> tuple[HeldOutChannel, .
                     _floor(search, output.name, output.sd),
                     math.inf if output.sd is not None else rmse(augmented.simulated[output.name]),
                 ),
-                noise=judged_noise(search, output.name),
+                noise=judged_noise(problem, search.augmented, output.name),
                 spread=float(np.std(problem.judged(output.name, problem.observed[output.name]))),
             )
         )
     return tuple(errors)
 
 
-def judged_noise(search: Search, name: str) -> ChannelNoise:
-    """Return the noise of what is judged of an output, the sensor's apart."""
-    problem, parts = search.problem, noise_parts(search.problem, search.augmented, name)
-    if name not in problem.rates:
-        return parts
-    total = float(np.mean(problem.judged(name, search.augmented.residual[name]) ** 2))
-    sensor = min(problem.judged_sd(name, parts.sensor_sd), math.sqrt(total))
-    return replace(parts, sensor_sd=sensor, process_sd=math.sqrt(max(total - sensor**2, 0.0)))
+def judged_unit(problem: Problem, output: Output) -> str:
+    """Return the unit of what is judged of an output: of one that drifts that of its rate."""
+    return reduced(f"{bracketed(output.unit)}/s") if output.name in problem.rates else output.unit
 
 
 def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) -> tuple[HeldOutChannel, ...]:
@@ -94,7 +91,7 @@ def _floor(search: Search, name: str, sd: float | None) -> float:
     problem, residual = search.problem, search.augmented.residual[name]
     if sd is not None:
         return problem.judged_sd(name, sd)
-    known = judged_noise(search, name)
+    known = judged_noise(problem, search.augmented, name)
     if known.how == "repeats":
         return known.sensor_sd
     noise = math.sqrt(float(np.mean(problem.judged(name, residual) ** 2)))

@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import DiagnosedEffect, Verdict, cut_short, untested
+from toolkit.diagnosis.answer.held_out_errors import judged_unit
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.diagnosis.policy import LOCATION, PRIORS, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.case_view import CaseView
 from toolkit.diagnosis.search.forward_step import Step
 from toolkit.diagnosis.search.noise_floor import beyond_noise
-from toolkit.diagnosis.search.unexplained import answered_input
+from toolkit.diagnosis.search.unexplained import answered_input, own_swing
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit, with_unit
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.problem import Stacked
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.unexplained import Line
 
@@ -159,14 +161,19 @@ def zeros_to_read(search: Search) -> list[str]:
 
 def _sensors(search: Search) -> list[str]:
     """Return that sensors' standard deviations are to be stated, where a rest may be their noise in part."""
-    outputs = {output.name: output for output in search.problem.model.outputs}
-    return [
-        f"State the standard deviation of {name} (sd) in the case, from its sensor's certificate or a run at "
-        f"rest: how much of the {with_unit(f'{part.total_sd:.2g}', outputs[name].unit)} that are left is "
-        "noise, this recording does not tell."
-        for name, part in beyond_noise(search.problem, search.augmented).items()
-        if search.problem.stated_sd(name) is None and part.process_sd > part.sensor_sd
-    ]
+    problem = search.problem
+    beyond = beyond_noise(problem, search.augmented)
+    sentences = []
+    for output in problem.model.outputs:
+        part = beyond.get(output.name)
+        if part is None or problem.stated_sd(output.name) is not None or part.process_sd <= part.sensor_sd:
+            continue
+        left = with_unit(f"{part.total_sd:.2g}", judged_unit(problem, output))
+        sentences.append(
+            f"State the standard deviation of {output.name} (sd) in the case, from its sensor's certificate "
+            f"or a run at rest: how much of the {left} that are left is noise, this recording does not tell."
+        )
+    return sentences
 
 
 def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
@@ -217,7 +224,7 @@ def to_find_it(search: Search, subject: str = "The mismatch") -> list[str]:
     ]
     lines = [line for line in swings if not line.angle]
     if lines:
-        sentences += _swinging(search.problem, lines, subject)
+        sentences += _swinging(search.problem, lines, search.augmented.simulated, subject)
     if "run" in variables:
         standing = _levels(search.problem)
         levels, do = " and ".join(standing), "does" if len(standing) == 1 else "do"
@@ -270,7 +277,7 @@ def _levels(problem: Problem) -> list[str]:
     return standing
 
 
-def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str]:
+def _swinging(problem: Problem, lines: Sequence[Line], simulated: Stacked, subject: str) -> list[str]:
     """Return what to do about lines in time; of one in step with a recorded angle, its number a turn."""
     sentences, unturned = [], []
     for line in lines:
@@ -281,6 +288,12 @@ def _swinging(problem: Problem, lines: Sequence[Line], subject: str) -> list[str
             sentences.append(
                 f"{subject} swings at {line.told}, {times} as {name}: it answers to {name}. "
                 f"Repeat the run with {name} half as large, and with {name} half as fast."
+            )
+            continue
+        if order is None and (own := own_swing(problem, line, simulated)) is not None:
+            sentences.append(
+                f"{subject} swings at {line.told}, where the simulated {own[0]} swings by itself: its period, "
+                "its damping or its start is a little off. Repeat the run from a start half as large."
             )
             continue
         if order is None:

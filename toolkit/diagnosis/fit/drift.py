@@ -7,12 +7,13 @@ it is right; how fast it moves meanwhile does.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.sensor_noise import noise_parts
+from toolkit.diagnosis.fit.sensor_noise import noise_parts, robust_sd
 from toolkit.diagnosis.policy import DRIFT
 from toolkit.diagnosis.simulators.simulator import TermPattern
 from toolkit.effects.applied import AppliedEffect
@@ -67,10 +68,12 @@ def _led_nowhere(problem: Problem, base: Fit) -> set[str]:
 
 
 def _rows_apart(problem: Problem, base: Fit, name: str) -> int:
-    """Return the fewest rows over which the error moves by more than the sensor's noise alone would."""
-    noise = 2 * noise_parts(problem, base, name).sensor_sd ** 2
+    """Return the fewest rows over which most moves of the error are more than the sensor's noise."""
+    noise = math.sqrt(2) * noise_parts(problem, base, name).sensor_sd
     longest, apart = _part(problem, name), 1
-    while apart < longest and _moves(problem, base.residual[name], name, apart) < DRIFT.clear * noise:
+    while (
+        apart < longest and robust_sd(_moves(problem, base.residual[name], name, apart)) < DRIFT.clear * noise
+    ):
         apart *= 2
     return min(apart, longest)
 
@@ -79,7 +82,7 @@ def _wanders(problem: Problem, residual: Array, name: str) -> bool:
     """Tell whether most of an error is the sum of what came before, and not what happens there."""
     parts = [residual[at][problem.kept[name][at]] for at in problem.slices]
     variance = float(np.mean([part.var() for part in parts if len(part)]))
-    moves = _moves(problem, residual, name, _part(problem, name))
+    moves = float(np.mean(_moves(problem, residual, name, _part(problem, name)) ** 2))
     return bool(moves < DRIFT.wanders * 2 * variance)
 
 
@@ -89,6 +92,6 @@ def _part(problem: Problem, name: str) -> int:
     return max(min(count for count in counts if count) // DRIFT.parts, 1)
 
 
-def _moves(problem: Problem, residual: Array, name: str, apart: int) -> float:
+def _moves(problem: Problem, residual: Array, name: str, apart: int) -> Array:
     parts = [residual[at][problem.kept[name][at]] for at in problem.slices]
-    return float(np.mean(np.concatenate([part[apart:] - part[:-apart] for part in parts]) ** 2))
+    return np.concatenate([part[apart:] - part[:-apart] for part in parts])

@@ -248,7 +248,7 @@ class UnseenRun:
                 left, constant = white - taken, constant - cost
         product = white.T @ left
         return UnseenRun(
-            n=where.n / (noise.memory or 1.0),
+            n=where.n if noise.memory is None else noise.memory.independent(where),
             constant=constant,
             rest=float(product[0, 0]),
             inner=product[1:, 1:],

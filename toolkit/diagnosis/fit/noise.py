@@ -23,17 +23,47 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Memory:
+    """By what a rest is weighed that is no noise: its size, over values that its memory leaves independent.
+
+    ``rows`` to one independent value. Of an output that only drifts it is its changes over some rows, as many
+    as are ``apart``; of any other its values, none apart.
+    """
+
+    rows: float
+    apart: int = 0
+
+    def weighed(self, values: Array, where: Layout) -> Array:
+        """Return what counts of kept values, (n,) or (n, k): nothing of rows with none so far behind them."""
+        if not self.apart:
+            return values
+        changes = np.zeros_like(values)
+        for segment in where.segments:
+            part = values[segment]
+            changes[segment][self.apart :] = part[self.apart :] - part[: len(part) - self.apart]
+        return changes
+
+    def counted(self, where: Layout) -> int:
+        """Return how many rows of a layout count."""
+        return sum(max(segment.stop - segment.start - self.apart, 0) for segment in where.segments)
+
+    def independent(self, where: Layout) -> float:
+        """Return the number of independent values of a layout."""
+        return self.counted(where) / self.rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Autoregression:
     """An autoregression: reflection coefficients, and the innovations' standard deviation.
 
     ``reflection`` has one entry an order; white noise has none. ``sd`` is in the output's unit. What a
-    simulation is off by is no noise, and its past foretells no row of it: it has a ``memory``, the rows to
-    one independent value, and is weighed by its size and their number alone.
+    simulation is off by is no noise, and its past foretells no row of it: it has a ``memory`` and is weighed
+    by that.
     """
 
     reflection: tuple[float, ...]
     sd: float
-    memory: float | None = None
+    memory: Memory | None = None
 
     @property
     def is_coloured(self) -> bool:
@@ -50,7 +80,7 @@ class Autoregression:
     def correlation_rows(self) -> float:
         """Rows to one independent value of the noise's mean: its spectrum at zero over its variance."""
         if self.memory is not None:
-            return self.memory
+            return self.memory.rows
         polynomial = predictor(self.reflection)[-1]
         at_zero = (self.sd / max(abs(1 - float(np.sum(polynomial))), 1e-6)) ** 2
         return max(1.0, at_zero / max(self.marginal_sd**2, 1e-300))
@@ -110,7 +140,7 @@ class Layout:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Differences:
-    """Differences of an output's kept values over some ``rows``, within the segments of a layout."""
+    """Differences of an output's kept values over some ``rows`` within a layout; over none the values."""
 
     where: Layout
     rows: int
@@ -127,7 +157,9 @@ class Differences:
         """Return the differences of a column over all rows, (rows,) or (rows, k)."""
         values = column[self.where.index]
         parts = [values[part] for part in self.where.segments]
-        return np.concatenate([part[self.rows :] - part[: -self.rows] for part in parts])
+        return np.concatenate(
+            [part[self.rows :] - part[: len(part) - self.rows] if self.rows else part for part in parts]
+        )
 
 
 def layout(times: Sequence[Array], counted: Sequence[NDArray[np.bool_]], *, ordered: bool = True) -> Layout:
@@ -162,7 +194,7 @@ def fit_noise(
     floor: float,
     sd: float | None = None,
     used: int = 0,
-    memory: float | None = None,
+    memory: Memory | None = None,
 ) -> Autoregression:
     """Return the noise of a residual: Burg's method over all segments, the order by BIC.
 
@@ -173,12 +205,14 @@ def fit_noise(
     sd : total sensor noise that a certificate states; the innovations are never taken as smaller than what
         it leaves
     used : parameters that were fitted to the residual
-    memory : rows to one independent value of a residual that is known to be no noise
+    memory : by which a residual is weighed that is known to be no noise
     """
     n = where.n
+    if memory is not None:
+        residual, n = memory.weighed(residual, where), memory.counted(where)
     if n == 0:
-        return Autoregression(reflection=(), sd=floor)
-    variance = float(np.mean(residual**2))
+        return Autoregression(reflection=(), sd=floor, memory=memory)
+    variance = float(np.sum(residual**2)) / n
     if memory is None and sd is not None and variance > (NOISE.mismatch * sd) ** 2:
         # Most of it is none of the sensor's. Taken as coloured noise, a smooth mismatch foretells itself, and
         # what mends all but a jagged rest of it would look worse than nothing.
@@ -248,7 +282,7 @@ def whiten(values: Array, where: Layout, noise: Autoregression) -> Array:
     Exact for a stationary autoregression: the first values of a segment are predicted by lower orders.
     """
     if noise.memory is not None:
-        return values / (noise.marginal_sd * math.sqrt(noise.memory))
+        return noise.memory.weighed(values, where) / (noise.marginal_sd * math.sqrt(noise.memory.rows))
     orders = predictor(noise.reflection)
     p = len(noise.reflection)
     if p == 0:
@@ -304,7 +338,7 @@ def log_likelihood(residual: Array, where: Layout, noise: Autoregression) -> flo
     white = whiten(residual, where, noise)
     if noise.memory is not None:
         constant = math.log(noise.marginal_sd) + 0.5 * math.log(2 * math.pi)
-        return float(-0.5 * np.sum(white**2) - where.n / noise.memory * constant)
+        return float(-0.5 * np.sum(white**2) - noise.memory.independent(where) * constant)
     p = len(noise.reflection)
     shorter = 0.0
     if p:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, layout
+from toolkit.diagnosis.fit.noise import Layout, Memory, layout
 from toolkit.diagnosis.fit.row_order import drivers_of
 from toolkit.diagnosis.policy import ROWS
 from toolkit.diagnosis.simulators.run_starts import RunStart
@@ -54,7 +54,7 @@ class Problem:
     slices: tuple[slice, ...]
     rates: Mapping[str, int] = field(default_factory=dict)
     shown_sd: Mapping[str, float] = field(default_factory=dict)
-    memory: Mapping[str, float] = field(default_factory=dict)
+    memory: Mapping[str, Memory] = field(default_factory=dict)
 
     @property
     def declared(self) -> tuple[CaseParameter, ...]:
@@ -73,7 +73,10 @@ class Problem:
     @property
     def values(self) -> float:
         """Values that count of all outputs, of those with a memory the independent ones."""
-        return sum(float(kept.sum()) / self.memory.get(name, 1.0) for name, kept in self.kept.items())
+        return sum(
+            self.memory[name].independent(self.layout(name)) if name in self.memory else float(kept.sum())
+            for name, kept in self.kept.items()
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -274,7 +277,8 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
     judged on the same rows. An outlier is one of the recording. Where a recording is smooth, or an input
     moves sharply, a value to which its neighbours lead is none: there it is the simulation that jumps, as
     one does that is late by a part of a row, and is far off in that row alone. Where an input's own value is
-    none that it can have, the simulation jumps by that.
+    none that it can have, the simulation jumps by that. What the simulation meets to the last digit it starts
+    from: it is the rows behind that are off.
     """
     from dataclasses import replace
 
@@ -296,7 +300,7 @@ def without_outliers(problem: Problem, residual: Stacked) -> Problem:
             scale = 1.4826 * float(np.median(np.abs(away))) or float(np.std(away))
             steps = 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
             noise = max(scale, steps, 1e-300)
-            far = np.abs(away) > ROWS.isolated * noise
+            far = (np.abs(away) > ROWS.isolated * noise) & (values != 0)
             answering = beside[counting] & _answers(beside[counting], far)
             if problem.case.has_order:
                 recorded = problem.observed[name][places]

@@ -11,7 +11,7 @@ Source: Rice, Ann. Statist. 12 (1984) 1215, variance from differences; of third 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -64,6 +64,22 @@ def noise_parts(problem: Problem, fit: Fit, name: str) -> ChannelNoise:
     if how in ("differences", "resolution"):
         sensor = min(sensor, total) if total > 0 else sensor
     return ChannelNoise(sensor_sd=sensor, process_sd=math.sqrt(max(total**2 - sensor**2, 0.0)), how=how)
+
+
+def judged_noise(problem: Problem, fit: Fit, name: str) -> ChannelNoise:
+    """Return the noise of what is judged of an output, values or rates [1/s], the sensor's apart."""
+    parts = noise_parts(problem, fit, name)
+    if name not in problem.rates:
+        return parts
+    total = float(np.mean(problem.judged(name, fit.residual[name]) ** 2))
+    sensor = min(problem.judged_sd(name, parts.sensor_sd), math.sqrt(total))
+    return replace(parts, sensor_sd=sensor, process_sd=math.sqrt(max(total - sensor**2, 0.0)))
+
+
+def judged_spread(problem: Problem, name: str) -> float:
+    """Return the standard deviation of what is judged of an output as it was recorded."""
+    values = problem.judged(name, problem.observed[name])
+    return float(np.std(values)) if len(values) else 0.0
 
 
 def _sensor(problem: Problem, fit: Fit, name: str) -> tuple[float, Evidence]:

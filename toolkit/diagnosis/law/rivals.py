@@ -78,6 +78,8 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     fewer = _does_with_fewer(search, alone)
     if alike and not fewer:
         return search, laws
+    if fewer and (formula := _own_formula(search, alone)) is not None:
+        return formula, learned(formula, withdrawn=False, budget=budget)
     if not fewer and any(_holds_beside(laws, step) for step in search.steps):
         more = parameters_of(alone.fit) - parameters_of(laws.fit)
         beside_laws = laws.held_out if predicting else search.held_augmented
@@ -130,6 +132,32 @@ def _does_with_fewer(search: Search, alone: Laws) -> bool:
     return gain >= STEP.least_gain and unseen_error(problem, held_out) < unseen_error(
         problem, search.held_augmented
     )
+
+
+def _own_formula(search: Search, alone: Laws) -> Search | None:
+    """Return a search with the one effect whose own formula the first law is; None where it is that of none.
+
+    What several effects did together the law does better. One of them may do what it does alone: then that is
+    what is missing, and the others mended its form.
+    """
+    problem, first = search.problem, _whole(alone.listed)[:1]
+    added = [each.applied for law in first for each in law.together]
+    try:
+        made = fit(problem, added, start=alone.fit.p)
+        by_law = hold_out(problem, search.folds, made.active, made)
+        for step in _effects(search):
+            named = fit(problem, (step.active,), start=search.augmented.p)
+            held_out = hold_out(problem, search.folds, named.active, named)
+            if take_as_much(problem, search.held_refitted, held_out, by_law, least=least_share(named, made)):
+                gained = held_out.total - search.held_refitted.total
+                alone_step = replace(step, active=named.active[0], held_out_gain=gained, rivals=())
+                return replace(
+                    search, steps=(alone_step,), augmented=named, held_augmented=held_out,
+                    structure=search.structure_before,
+                )  # fmt: skip
+    except FitError:
+        pass
+    return None
 
 
 def _whole(listed: Sequence[Law]) -> list[Law]:

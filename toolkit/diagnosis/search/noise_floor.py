@@ -14,8 +14,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.noise import Layout, draws, fit_noise, memory_of
-from toolkit.diagnosis.fit.sensor_noise import ChannelNoise, noise_parts, shows_sensor, spread
+from toolkit.diagnosis.fit.noise import Differences, Layout, Memory, draws, fit_noise, memory_of
+from toolkit.diagnosis.fit.sensor_noise import (
+    ChannelNoise,
+    judged_noise,
+    judged_spread,
+    noise_parts,
+    shows_sensor,
+    spread,
+)
 from toolkit.diagnosis.fit.structure import RUNS, SmoothDependence, groups
 from toolkit.diagnosis.policy import NOISE, ROWS, STRUCTURE, UNSEEN, VERDICT
 from toolkit.diagnosis.search.unexplained import StructureFound
@@ -40,8 +47,9 @@ def hidden_in_noise(problem: Problem, folds: Folds, base: Fit, seed: int) -> tup
         parts = noise_parts(problem, base, name)
         if not problem.kept[name].any() or parts.is_sensor:
             continue
-        if _is_large(problem, base, name, parts):
-            ratio = parts.total_sd / (NOISE.largest * spread(problem, name))
+        judged = judged_noise(problem, base, name)
+        if _is_large(problem, base, name, judged):
+            ratio = judged.total_sd / (NOISE.largest * judged_spread(problem, name))
             gain = 2 * problem.layout(name).n * math.log(ratio) / base.noise[name].correlation_rows
             found.append(_untested(name, LARGE, gain))
         if parts.process_sd > parts.sensor_sd:
@@ -94,7 +102,7 @@ def is_beyond_noise(problem: Problem, base: Fit) -> bool:
 
 def beyond_noise(problem: Problem, base: Fit) -> dict[str, ChannelNoise]:
     """Return outputs whose rest is so large that no colour makes it noise, with what was taken for theirs."""
-    parts = {name: noise_parts(problem, base, name) for name in problem.names if problem.kept[name].any()}
+    parts = {name: judged_noise(problem, base, name) for name in problem.names if problem.kept[name].any()}
     return {
         name: part
         for name, part in parts.items()
@@ -117,19 +125,21 @@ def weighed_as_mismatch(problem: Problem, base: Fit, *, may_be_noise: bool = Fal
     if not problem.case.has_order:
         return problem
     memory, known = {}, {*beyond_noise(problem, base), *problem.memory}
-    for name in (each for each in problem.names if problem.kept[each].any() and each not in problem.rates):
-        parts, where = noise_parts(problem, base, name), problem.layout(name)
-        matters = parts.total_sd > VERDICT.accuracy * spread(problem, name)
+    for name in (each for each in problem.names if problem.kept[each].any()):
+        parts = judged_noise(problem, base, name)
+        matters = parts.total_sd > VERDICT.accuracy * judged_spread(problem, name)
         if not (matters and (may_be_noise or name in known)):
             continue
         if parts.process_sd <= NOISE.mismatch * parts.sensor_sd:
             continue
-        noise = fit_noise(base.residual[name][where.index], where, floor=problem.floor[name])
+        judged = Differences(problem.layout(name), problem.rates.get(name, 0))
+        where = judged.layout
+        noise = fit_noise(judged.of(base.residual[name]), where, floor=problem.floor[name])
         # Runs are independent, whatever stays the same in each of them.
         own = float(np.median([problem.kept[name][rows].sum() for rows in problem.slices]))
         rows = min(memory_of(noise, int(own)), own)
         if where.n >= UNSEEN.runs * rows:  # fewer values show nothing
-            memory[name] = rows
+            memory[name] = Memory(rows=rows, apart=judged.rows)
     return replace(problem, memory=memory)
 
 
@@ -143,8 +153,9 @@ def may_leave_noise(problem: Problem, refitted: Fit, made: Fit) -> bool:
     """
     beyond = beyond_noise(problem, made)
     for name in problem.memory:
-        kept = problem.kept[name]
-        before, after = (float(np.mean(each.residual[name][kept] ** 2)) for each in (refitted, made))
+        before, after = (
+            float(np.mean(problem.judged(name, each.residual[name]) ** 2)) for each in (refitted, made)
+        )
         if name in beyond or after > (1 - VERDICT.nearly) * before:
             return False
     return True
@@ -158,9 +169,9 @@ def _is_large(problem: Problem, base: Fit, name: str, parts: ChannelNoise) -> bo
     """
     if base.active and parts.process_sd < parts.sensor_sd and shows_sensor(problem, base, name):
         return False
-    simulated = base.simulated[name][problem.kept[name]]
-    varies = float(np.std(simulated)) > NOISE.still * spread(problem, name)
-    return varies and parts.total_sd > NOISE.largest * spread(problem, name)
+    size = judged_spread(problem, name)
+    varies = float(np.std(problem.judged(name, base.simulated[name]))) > NOISE.still * size
+    return varies and parts.total_sd > NOISE.largest * size
 
 
 def _followed(

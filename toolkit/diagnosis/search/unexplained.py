@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from toolkit.units import unit
 if TYPE_CHECKING:
     from toolkit.arrays import Array
     from toolkit.diagnosis.case.case import CaseChannel
+    from toolkit.diagnosis.fit.problem import Stacked
 
 # Lines in the spectrum of a residual: a disturbance that repeats in time, of a period that nobody named.
 
@@ -94,10 +95,35 @@ def answered_input(problem: Problem, line: Line) -> tuple[str, int] | None:
 
     What is bent answers to a swing by its multiples, and nothing else has to turn there.
     """
-    for channel in problem.case.drivers:
-        multiples = [_multiple(line, run.t, run.columns.get(channel.name)) for run in problem.runs]
+    return _swings_of(
+        problem,
+        line,
+        {
+            channel.name: [run.columns.get(channel.name) for run in problem.runs]
+            for channel in problem.case.drivers
+        },
+    )
+
+
+def own_swing(problem: Problem, line: Line, simulated: Stacked) -> tuple[str, int] | None:
+    """Return the simulated output whose own swing has a line [Hz] among its multiples, and which it is.
+
+    A swing that is a little too quick, too large or late leaves a line where the simulation itself swings.
+    """
+    return _swings_of(
+        problem, line, {name: [column[rows] for rows in problem.slices] for name, column in simulated.items()}
+    )
+
+
+def _swings_of(
+    problem: Problem, line: Line, columns: Mapping[str, Sequence[Array | None]]
+) -> tuple[str, int] | None:
+    """Return the first of some columns, of every run each, that swings in all of them with a line's divisor."""
+    for name, of_runs in columns.items():
+        pairs = zip(problem.runs, of_runs, strict=True)
+        multiples = [_multiple(line, run.t, column) for run, column in pairs]
         if multiples and None not in multiples and len(set(multiples)) == 1:
-            return channel.name, int(multiples[0] or 0)
+            return name, int(multiples[0] or 0)
     return None
 
 

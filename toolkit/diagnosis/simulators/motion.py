@@ -1,8 +1,8 @@
 """Equations of motion behind a simulator that cannot be opened: force-like terms on its outputs.
 
-Two shapes are told apart by units. An output that is a force or a moment, beside a recorded velocity, is
-the sum of the terms of the equation: a missing one is added to it. Where only the position was recorded in
-time, its rate is the velocity. An output that is a position or a
+Two shapes are told apart by units. An output that is a force, a moment or the current that a drive takes to
+exert them, beside a recorded velocity, is the sum of the terms of the equation: a missing one is added to it.
+Where only the position was recorded in time, its rate is the velocity. An output that is a position or a
 velocity moves by the simulator's own acceleration along its trajectory; a missing term changes that
 acceleration, and the motion is integrated anew (exact where the simulator's acceleration depends on time
 alone, as in a free fall).
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from toolkit.effects.facts import ForceHook, Values
 
 _LENGTHS = ("length", "angle")
+_EFFORTS = ("force", "moment", "[current]")
 _SUBSTEPS = 4
 
 
@@ -247,7 +248,7 @@ def motion_of(case: Case) -> Motion | None:
     outputs = {output.name: dimension(output.unit) for output in case.outputs}
     velocity = next((driver.name for driver in case.drivers if is_speed(driver.unit)), None)
     position = next((name for name, kind in inputs.items() if kind in _LENGTHS), None)
-    force = next((name for name, kind in outputs.items() if kind in ("force", "moment")), None)
+    force = next((name for name, kind in outputs.items() if kind in _EFFORTS), None)
     if force is not None and (velocity is not None or position is not None):
         rate = _speed(case, position) if velocity is None and position is not None else 0.0
         return Motion(case=case, kind="force", output=force, position=position, velocity=velocity, speed=rate)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
 from toolkit.effects.surroundings import of_force
 
@@ -26,5 +26,6 @@ EFFECT = Effect(
             name="force", unit="{force}", text="that acts all the time", typical=(0.01, 1.0), scale=of_force
         ),
     ),
+    confined_by=(ANY_OTHER,),
     term=Term(of="nothing", force=_resisting, drives=True),
 )

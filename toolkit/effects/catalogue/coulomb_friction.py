@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
 from toolkit.effects.filters import PAST
 from toolkit.effects.surroundings import Surroundings, of_force
@@ -134,6 +134,7 @@ EFFECT = Effect(
             most=_longest,
         ),
     ),
+    confined_by=(ANY_OTHER,),
     term=Term(of="velocity", force=_resisting, recorded=_recorded, bristle=_bristle_of),
     numerics=_smoothing,
     remembers=True,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
 from toolkit.effects.surroundings import Surroundings
 
@@ -35,6 +35,7 @@ EFFECT = Effect(
             scale=_at_the_farthest,
         ),
     ),
+    confined_by=(ANY_OTHER,),
     term=Term(of="position", force=_resisting, on_place=True),
     form_error=0.03,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolkit.effects.effect import Effect, EffectParameter
+from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
 from toolkit.effects.surroundings import Surroundings
 
@@ -35,6 +35,7 @@ EFFECT = Effect(
             bounds=(0.0, float("inf")),
         ),
     ),
+    confined_by=(ANY_OTHER,),
     term=Term(of="velocity", force=_resisting),
     form_error=0.03,
 )
