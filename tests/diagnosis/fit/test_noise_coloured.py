@@ -7,6 +7,7 @@ from scipy.stats import multivariate_normal
 
 from toolkit.diagnosis.fit.noise import (
     Autoregression,
+    Memory,
     autocovariance,
     draws,
     fit_noise,
@@ -163,13 +164,34 @@ def test_segments_are_whitened_as_each_is_alone(order):
 def test_rows_with_a_memory_are_worth_the_values_that_it_leaves_independent():
     x = np.random.default_rng(3).normal(size=40)
     each = fit_noise(x, _one(40), floor=1e-12)
-    repeated = fit_noise(np.repeat(x, 5), _one(200), floor=1e-12, memory=5.0)
+    repeated = fit_noise(np.repeat(x, 5), _one(200), floor=1e-12, memory=Memory(rows=5.0))
     assert repeated.marginal_sd == pytest.approx(np.sqrt(np.mean(x**2)))
     white = Autoregression(reflection=(), sd=each.marginal_sd)
     of_rows = log_likelihood(np.repeat(x, 5), _one(200), repeated)
     assert of_rows == pytest.approx(log_likelihood(x, _one(40), white))
     assert not repeated.is_coloured
     assert repeated.correlation_rows == 5.0
+
+
+def test_changes_with_a_memory_are_worth_the_values_that_it_leaves_independent():
+    """Of what only drifts its changes are weighed: where it stands says nothing."""
+    steps = np.random.default_rng(3).normal(size=40)
+    drifting = 7.0 + np.concatenate([[0.0], np.cumsum(np.repeat(steps, 5))])
+    where, memory = _one(201), Memory(rows=5.0, apart=1)
+    noise = fit_noise(drifting, where, floor=1e-12, memory=memory)
+    assert noise.marginal_sd == pytest.approx(np.sqrt(np.mean(steps**2)))
+    assert memory.independent(where) == pytest.approx(40.0)
+    white = Autoregression(reflection=(), sd=noise.marginal_sd)
+    assert log_likelihood(drifting, where, noise) == pytest.approx(log_likelihood(steps, _one(40), white))
+    assert whiten(drifting, where, noise)[0] == 0.0
+
+
+def test_no_change_reaches_over_a_gap():
+    parts = layout([np.r_[np.arange(4.0), np.arange(100.0, 103.0)]], [np.ones(7, dtype=bool)])
+    memory = Memory(rows=1.0, apart=2)
+    changes = memory.weighed(np.array([0.0, 1.0, 4.0, 9.0, 50.0, 60.0, 75.0]), parts)
+    assert changes.tolist() == [0, 0, 4, 8, 0, 0, 25]
+    assert memory.counted(parts) == 3
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.5, 0.9])

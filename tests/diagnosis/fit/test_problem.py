@@ -34,6 +34,15 @@ def test_a_row_far_off_its_neighbours_is_left_out(noise):
     assert np.flatnonzero(~kept).tolist() == [120, 233]
 
 
+def test_the_row_that_a_simulation_starts_from_is_no_outlier(noise):
+    """It begins where the recording does, and is off from the next row on."""
+    off = 40.0 + noise
+    off[0] = 0.0
+    off[200] += 80.0
+    kept = without_outliers(problem_of(off), {"FY": off}).kept["FY"]
+    assert np.flatnonzero(~kept).tolist() == [200]
+
+
 def test_what_answers_a_sharp_move_is_no_outlier(noise):
     sharp = np.flatnonzero(np.abs(np.diff(RAMP)) > 3)
     noise[sharp] += 40.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.law.trial import unlocked_tone
+from toolkit.diagnosis.search.unexplained import own_swing, strongest_line
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 HEAD = case_text(
@@ -80,3 +82,35 @@ def test_a_ripple_of_a_shaft_is_told_over_its_angle(tmp_path, measure, turn):
     assert fitted["period"] == pytest.approx(turn / 12, abs=4 * tone.sds["period"])
     assert fitted["a"] == pytest.approx(0.2, abs=4 * tone.sds["a"])
     assert tone.applied.units["period"] == measure
+
+
+SWING = """
+import numpy as np
+import pandas as pd
+def simulate(inputs, p):
+    t = inputs["t"].to_numpy()
+    return pd.DataFrame({"F": p["gain"] * inputs["L"].iloc[0] * np.exp(-0.01 * t) * np.cos(3.1 * t)})
+"""
+
+
+@pytest.mark.parametrize(("ringing_Hz", "told"), [(None, False), (0.9, True)])
+def test_a_swing_that_is_off_a_little_leaves_no_tone(
+    tmp_path: Path, ringing_Hz: float | None, told: bool
+) -> None:
+    """A body that swings by itself half a per cent too quickly, or beside something that turns."""
+    t, runs = np.arange(600) * 0.1, {}
+    for k, start in enumerate((1.0, 0.7, 0.4)):
+        rng = np.random.default_rng(k)
+        F = start * np.exp(-0.012 * t) * np.cos((3.1 if ringing_Hz else 3.115) * t) + rng.normal(
+            0, 0.002, t.size
+        )
+        if ringing_Hz:
+            F += 0.05 * np.sin(2 * math.pi * ringing_Hz * t + k)
+        runs[f"r{k}__csv"] = pd.DataFrame({"t": t, "L": np.full(t.size, start), "F": F})
+    case = read_case(write_case(tmp_path, HEAD, simulator=SWING, **runs))
+    problem = problem_of(case, model_of(case, None))
+    made = fit(problem, plain=True)
+    line = strongest_line(problem, "F", made.residual["F"])
+    assert line is not None
+    assert (own_swing(problem, line, made.simulated) is None) is told
+    assert (unlocked_tone(problem, made, "F") is not None) is told

@@ -292,8 +292,8 @@ def _swinging(problem: Problem, lines: Sequence[Line], simulated: Stacked, subje
             continue
         if order is None and (own := own_swing(problem, line, simulated)) is not None:
             sentences.append(
-                f"{subject} swings at {line.told}, where the simulated {own[0]} swings by itself: its period, "
-                "its damping or its start is a little off. Repeat the run from a start half as large."
+                f"{subject} swings at {line.told}, where the simulated {own[0]} swings by itself: its "
+                "period, its damping or its start is a little off. Repeat the run from a start half as large."
             )
             continue
         if order is None:

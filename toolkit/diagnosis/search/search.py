@@ -321,13 +321,18 @@ def _searched(
     with contextlib.suppress(BudgetSpentError):
         named, (base, held_base, steps) = (
             steps,
-            told_from_none(problem, folds, base, held_base, steps),
+            told_from_none(problem, folds, base, held_base, steps, trust=screen.trust(base.noise)),
         )
         structure = structure if steps or not named else before
     scatter: tuple[RunScatter, ...] = ()
     if steps:
         with contextlib.suppress(BudgetSpentError):
+            told = len(steps)
             base, held_base, steps, scatter = _beside_scatter(problem, folds, base, held_base, steps)
+            if len(steps) < told:  # beside what went, what stays was another effect
+                base, held_base, steps = told_from_none(
+                    problem, folds, base, held_base, steps, trust=screen.trust(base.noise)
+                )
     # Every effect with its values of the last joint fit, not of the step that found it.
     values = {applied.key: applied for applied in base.active}
     steps = [replace(step, active=values[step.active.key]) for step in steps]

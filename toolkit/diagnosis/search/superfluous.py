@@ -170,7 +170,7 @@ def with_a_size(problem: Problem, base: Fit, steps: list[Step]) -> tuple[Fit, li
 
 
 def told_from_none(
-    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step]
+    problem: Problem, folds: Folds, base: Fit, held_base: HeldOut, steps: list[Step], *, trust: float
 ) -> tuple[Fit, HeldOut, list[Step]]:
     """Return a hypothesis without effects whose sizes, all together, may be none.
 
@@ -178,12 +178,16 @@ def told_from_none(
     stops, an interval of the curvature reaches to zero for an effect without which nothing is foretold. Then
     the likelihood's own chord from there to none is the sizes' standard deviation (profile likelihood). A
     constant in an equation has to be more than the mean of a plant that wanders, by whatever step it came.
+
+    Parameters
+    ----------
+    trust : share of a gain that a series so short keeps, by which intervals are wider
     """
     from scipy.stats import chi2
 
     for applied in base.active:
         away, own = sizes_off(base, applied)
-        reach = float(chi2.ppf(VERDICT.interval, len(own))) if own else 0.0
+        reach = float(chi2.ppf(VERDICT.interval, len(own))) / trust if own else 0.0
         listed = [step for step in steps if step.active.key != applied.key]
         wanders = may_wander(problem, applied)
         if not (wanders or away < reach) or len(listed) == len(steps):
@@ -205,5 +209,5 @@ def told_from_none(
             scores = hold_out(problem, folds, bare.active, bare)
         except FitError:  # so does a part of it
             continue
-        return told_from_none(problem, folds, bare, scores, listed)
+        return told_from_none(problem, folds, bare, scores, listed, trust=trust)
     return base, held_base, steps

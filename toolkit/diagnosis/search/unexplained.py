@@ -118,7 +118,7 @@ def own_swing(problem: Problem, line: Line, simulated: Stacked) -> tuple[str, in
 def _swings_of(
     problem: Problem, line: Line, columns: Mapping[str, Sequence[Array | None]]
 ) -> tuple[str, int] | None:
-    """Return the first of some columns, of every run each, that swings in all of them with a line's divisor."""
+    """Return the first of some columns, one a run, of whose swing in all runs a line is the same multiple."""
     for name, of_runs in columns.items():
         pairs = zip(problem.runs, of_runs, strict=True)
         multiples = [_multiple(line, run.t, column) for run, column in pairs]
