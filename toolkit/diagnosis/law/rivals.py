@@ -83,9 +83,15 @@ def judged_by_laws(search: Search, laws: Laws, *, seed: int, budget: TimeBudget)
     if not fewer and any(_holds_beside(laws, step) for step in search.steps):
         more = parameters_of(alone.fit) - parameters_of(laws.fit)
         beside_laws = laws.held_out if predicting else search.held_augmented
-        # Of as many parameters it has to be better, of fewer no worse.
+        # Of as many parameters it has to be better, by its score and in some output, of fewer no worse.
         least = STEP.least_gain if more == 0 else -STEP.least_gain
-        if more > 0 or alone.held_out.total - beside_laws.total < least:
+        worse = more > 0 or alone.held_out.total - beside_laws.total < least
+        if worse or (
+            more == 0
+            and take_as_much(
+                search.problem, search.held_refitted, beside_laws, alone.held_out, least=LAWS.same
+            )
+        ):
             return search, laws
     elif alone.held_out.total - search.held_augmented.total < STEP.least_gain:
         return search, laws
