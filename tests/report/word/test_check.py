@@ -422,3 +422,29 @@ def test_a_package_with_a_hole_is_refused_for_what_it_lacks(
     with pytest.raises(TemplateError, match=says) as caught:
         opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit)
     assert caught.value.rule == rule
+
+
+@pytest.mark.parametrize("kind", ["styles", "settings", "numbering", "header1"])
+@pytest.mark.parametrize("declared", ["lost", "as text"])
+def test_a_part_that_is_not_declared_as_its_relation_says_is_refused(
+    tmp_path: Path, kind: str, declared: str
+) -> None:
+    """Such a part is none that can be read: Word repairs the file, and nothing here may stumble over it."""
+
+    def edit(members: dict[str, bytes]) -> None:
+        types, part = members["[Content_Types].xml"], f'PartName="/word/{kind}.xml"'.encode()
+        assert part in types
+        before, _, after = types.partition(part)
+        _, _, rest = after.partition(b"/>")
+        changed = (
+            b'PartName="/99.xml" ContentType="x/x"/>'
+            if declared == "lost"
+            else part + b' ContentType="text/plain"/>'
+        )
+        members["[Content_Types].xml"] = before + changed + rest
+
+    with pytest.raises(TemplateError, match="not declared as what it is") as caught:
+        check_template(
+            opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit), Style(), fonts=False
+        )
+    assert caught.value.rule == "zip-damaged"
