@@ -448,3 +448,21 @@ def test_a_part_that_is_not_declared_as_its_relation_says_is_refused(
             opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit), Style(), fonts=False
         )
     assert caught.value.rule == "zip-damaged"
+
+
+@pytest.mark.parametrize(
+    ("tag", "says"),
+    [
+        ("table.conditions", "did you mean tk:table."),
+        ("table.result", "did you mean tk:table.results?"),
+        ("figure.result", "see 'toolkit template tags'"),
+        ("tabel.results", "did you mean tk:table.results?"),
+    ],
+)
+def test_an_unknown_tag_is_answered_by_a_tag_of_its_kind(tmp_path: Path, tag: str, says: str) -> None:
+    (unknown,) = (
+        finding
+        for finding in check_template(opened(tmp_path, p(f"{{{{tk:{tag}}}}}")), Style(), fonts=False)
+        if finding.rule == "unknown-tag"
+    )
+    assert says in unknown.message
