@@ -28,4 +28,9 @@ RECIPES = (
         '[["part", "[Content_Types].xml", '
         '["replace", "PartName=\\"/word/styles.xml\\"", "PartName=\\"99999999999\\""]]]',
     ),
+    (
+        "template",
+        '[["part", "[Content_Types].xml", ["replace", "ContentType=\\"application/'
+        'vnd.openxmlformats-officedocument.wordprocessingml.styles+xml\\"", ""]]]',
+    ),
 )
