@@ -22,4 +22,15 @@ RECIPES = (
     ("run.csv", '[["word", 3, 0, "1.7e308"]]'),
     # A state of a watch with a list where a text stands.
     ("watch-state", '[["set", ["tests", "a", "rule"], "numbers"]]'),
+    # Styles whose kind no declaration states: a library hands them over as plain bytes.
+    (
+        "template",
+        '[["part", "[Content_Types].xml", '
+        '["replace", "PartName=\\"/word/styles.xml\\"", "PartName=\\"99999999999\\""]]]',
+    ),
+    (
+        "template",
+        '[["part", "[Content_Types].xml", ["replace", "ContentType=\\"application/'
+        'vnd.openxmlformats-officedocument.wordprocessingml.styles+xml\\"", ""]]]',
+    ),
 )

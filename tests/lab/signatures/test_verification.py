@@ -159,6 +159,28 @@ def test_the_code_on_a_page_is_of_the_day_that_its_entry_has(hub: Registry, tmp_
     assert "superseded by hub-r2" in verdict.why
 
 
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_document_of_another_laboratory_with_an_instrument_of_that_name_accuses_nobody_alone(
+    hub: Registry, make_session: Callable[..., Path], tmp_path: Path, rows: int
+) -> None:
+    """Two laboratories have the same machine: the ledger of one is no continuation of the other's."""
+    other = Registry(tmp_path / "other")
+    for seed in range(rows):
+        calibrate(make_session(hub_data(60, 7 + seed), name=f"other{seed}"), other)
+    verdict = _verdict(other, _pdf(hub, tmp_path, _dated()))
+    assert (verdict.ledger, verdict.code) == ("rolled_back", 1)
+    assert "or the document is of another laboratory's hub: no entry here holds its record" in verdict.why
+
+
+def test_where_an_entry_holds_the_record_the_ledger_is_this_one(hub: Registry, tmp_path: Path) -> None:
+    path = _pdf(hub, tmp_path, _dated())
+    ledger = hub.folder / "hub" / "ledger.jsonl"
+    ledger.write_text("".join(ledger.read_text().splitlines(keepends=True)[:-1]))
+    verdict = _verdict(Registry(hub.folder), path)
+    assert (verdict.ledger, verdict.code) == ("rolled_back", 1)
+    assert "another laboratory" not in verdict.why
+
+
 @pytest.mark.parametrize(("tested", "before", "since"), [(TEST, True, False), (None, None, None)])
 def test_a_manifest_says_the_day_of_its_test(
     hub: Registry, tmp_path: Path, tested: date | None, before: bool | None, since: bool | None

@@ -422,3 +422,47 @@ def test_a_package_with_a_hole_is_refused_for_what_it_lacks(
     with pytest.raises(TemplateError, match=says) as caught:
         opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit)
     assert caught.value.rule == rule
+
+
+@pytest.mark.parametrize("kind", ["styles", "settings", "numbering", "header1"])
+@pytest.mark.parametrize("declared", ["lost", "as text"])
+def test_a_part_that_is_not_declared_as_its_relation_says_is_refused(
+    tmp_path: Path, kind: str, declared: str
+) -> None:
+    """Such a part is none that can be read: Word repairs the file, and nothing here may stumble over it."""
+
+    def edit(members: dict[str, bytes]) -> None:
+        types, part = members["[Content_Types].xml"], f'PartName="/word/{kind}.xml"'.encode()
+        assert part in types
+        before, _, after = types.partition(part)
+        _, _, rest = after.partition(b"/>")
+        changed = (
+            b'PartName="/99.xml" ContentType="x/x"/>'
+            if declared == "lost"
+            else part + b' ContentType="text/plain"/>'
+        )
+        members["[Content_Types].xml"] = before + changed + rest
+
+    with pytest.raises(TemplateError, match="not declared as what it is") as caught:
+        check_template(
+            opened(tmp_path, p("{{tk:tire.size}}"), header=p("x"), edit=edit), Style(), fonts=False
+        )
+    assert caught.value.rule == "zip-damaged"
+
+
+@pytest.mark.parametrize(
+    ("tag", "says"),
+    [
+        ("table.conditions", "did you mean tk:table."),
+        ("table.result", "did you mean tk:table.results?"),
+        ("figure.result", "see 'toolkit template tags'"),
+        ("tabel.results", "did you mean tk:table.results?"),
+    ],
+)
+def test_an_unknown_tag_is_answered_by_a_tag_of_its_kind(tmp_path: Path, tag: str, says: str) -> None:
+    (unknown,) = (
+        finding
+        for finding in check_template(opened(tmp_path, p(f"{{{{tk:{tag}}}}}")), Style(), fonts=False)
+        if finding.rule == "unknown-tag"
+    )
+    assert says in unknown.message

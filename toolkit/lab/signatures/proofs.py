@@ -181,7 +181,7 @@ def registry_ledger(open_registry: Callable[[], Registry | None]) -> Ledger:
             return no_ledger(names, anchor)
         states = []
         if anchor is not None:
-            states.append(_continuity(registry, anchor))
+            states.append(_continuity(registry, anchor, names))
             if states[0].ledger == "continues" and states[0].still_holds is None:
                 names = names or _named_by(registry, anchor)
         states += [_standing(registry, name) for name in names]
@@ -227,14 +227,23 @@ def _joined(states: Sequence[LedgerState], nothing: LedgerState) -> LedgerState:
     )
 
 
-def _continuity(registry: Registry, anchor: Anchor) -> LedgerState:
-    """Return how a registry's ledger stands to a proof, and who signed the entry where it has it."""
+def _continuity(registry: Registry, anchor: Anchor, names: Sequence[Named]) -> LedgerState:
+    """Return how a registry's ledger stands to a proof, and who signed the entry where it has it.
+
+    Two laboratories may call an instrument alike. Where no entry holds a record that the document names, that
+    is said too: whoever removed entries and whoever never made them leave the same ledger.
+    """
     instrument = anchor.checkpoint.origin.removeprefix(ORIGIN)
     if instrument not in ledgers_of(registry):
         return LedgerState()
-    comparison = compare(raw_lines(registry, instrument), anchor.checkpoint, anchor)
+    lines = raw_lines(registry, instrument)
+    comparison = compare(lines, anchor.checkpoint, anchor)
     if comparison.continuity != "continues":
         why = f"the ledger of {instrument}: {comparison.why}"
+        if names and not any(name.sha256 in line for line in lines for name in names):
+            why += (
+                f", or the document is of another laboratory's {instrument}: no entry here holds its record"
+            )
         return LedgerState(ledger=comparison.continuity, still_holds=False, why=why)
     damage = damage_of(registry, instrument)
     if damage is not None:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from toolkit.report.style import Style
-from toolkit.report.tags import DRAWN, format_problem, parse_tag, width_emu
+from toolkit.report.tags import DRAWN, Tag, format_problem, parse_tag, width_emu
 from toolkit.report.vocabulary import Vocabulary
 from toolkit.report.word.decimals import coarse_decimals
 from toolkit.report.word.fonts import missing_fonts, undrawn
@@ -193,7 +193,7 @@ def _one(site: Site, words: Vocabulary) -> Iterator[LintFinding]:
         or (family == "value" and not words.knows(tag.path))
         or (tag.name not in families.get(family, {tag.name: ""}))
     ):
-        yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag.path, words)}")
+        yield _at(site, "unknown-tag", f"{tag} is not known: {_near(tag, words)}")
         return
     kind = family
     if family == "value":
@@ -250,9 +250,12 @@ def _swallowed(site: Site) -> Iterator[LintFinding]:
                 yield _at(site, "overlapping-tags", f"{tag} stands inside {site.tag}, which replaces it")
 
 
-def _near(path: str, words: Vocabulary) -> str:
-    near = nearest(path, [entry.path for entry in words.entries])
-    return f"did you mean tk:{near}?" if near else "see 'toolkit template tags'"
+def _near(tag: Tag, words: Vocabulary) -> str:
+    """Name a near tag of the same kind; of a value any tag, for its kind may be misspelt."""
+    kind = "" if tag.family == "value" else tag.path.partition(".")[0] + "."
+    names = [entry.path.removeprefix(kind) for entry in words.entries if entry.path.startswith(kind)]
+    near = nearest(tag.path.removeprefix(kind), names)
+    return f"did you mean tk:{kind}{near}?" if near else "see 'toolkit template tags'"
 
 
 def _in_heading(site: Site) -> bool:

@@ -22,8 +22,8 @@ from toolkit.inputs import TEMPLATE_FILE, read_input
 from toolkit.recording.sniff import ole_kind, sniff
 from toolkit.report.word.xml import Element, parser, q, walk_fields
 
-_MAIN = "application/vnd.openxmlformats-officedocument.wordprocessingml.{}.main+xml"
-DOCUMENT, TEMPLATE = _MAIN.format("document"), _MAIN.format("template")
+_KIND = "application/vnd.openxmlformats-officedocument.wordprocessingml.{}+xml"
+DOCUMENT, TEMPLATE = _KIND.format("document.main"), _KIND.format("template.main")
 _CT = "{http://schemas.openxmlformats.org/package/2006/content-types}"
 _REL = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MEMBERS, TOTAL, RATIO = 5000, 300 * 2**20, 400
@@ -106,12 +106,13 @@ def open_package(template: Template) -> Any:
     Raises
     ------
     TemplateError
-        a part is missing that another one refers to, or the package cannot be put together
+        a part is missing that another one refers to, one is not declared as what it is, or the package cannot
+        be put together
     """
     from docx.package import Package
 
     try:
-        return Package.open(io.BytesIO(template.data))
+        package = Package.open(io.BytesIO(template.data))
     except (KeyError, ValueError, TypeError, AttributeError, etree.LxmlError) as error:
         raise _refuse(
             template.path,
@@ -120,6 +121,26 @@ def open_package(template: Template) -> Any:
             got=error,
             expected="a file as Word saves it",
         ) from error
+    _check_kinds(template.path, package)
+    return package
+
+
+def _check_kinds(path: Path, package: Any) -> None:
+    """Refuse a part that its relation calls styles, a header, and its content type something else.
+
+    python-docx gives such a part as plain bytes: nobody would see the tags in it.
+    """
+    from docx.opc.part import PartFactory
+
+    for rel in package.main_document_part.rels.values():
+        kind = _KIND.format(rel.reltype.rpartition("/")[2])
+        expected = PartFactory.part_type_for.get(kind)
+        if expected is not None and not rel.is_external and not isinstance(rel.target_part, expected):
+            raise _refuse(
+                path, "zip-damaged", "a part of the template is not declared as what it is",
+                where=str(rel.target_part.partname).lstrip("/"), got=rel.target_part.content_type,
+                expected=kind,
+            )  # fmt: skip
 
 
 # What is no Word file, or a broken one, holds nothing that could be removed.
