@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 from tests.characteristics.tire_factory import LOAD, M15, PLYSTEER, Key, at_load, reduced_test, rows_of_many
+from toolkit.characteristics.catalogue import characteristics
 from toolkit.characteristics.characterise import characterise, characteristic_rows
+from toolkit.characteristics.characteristic import TRANSIENT
 from toolkit.characteristics.model import Row
 from toolkit.characteristics.shared_errors import root_of
 from toolkit.characteristics.uncertain import Part, Uncertain, weighted
@@ -85,9 +87,10 @@ def test_an_error_of_the_load_moves_each_value_as_its_part_says() -> None:
     size = M15.stated_uncertainty("FZ").relative
     bare = rows(reduced_test(loads=THREE))
     for key, row in bare.items():
-        force, moment = (_growth(key[1], size)[i] for i in (0, 1))
-        is_force = key[0] in ("conicity", "plysteer", "FY", "secant_cornering", "slope_cornering")
-        relative = force if is_force else moment
+        force, moment = _growth(key[1], size)
+        # A lever is a moment over a force; the slip angle does not change with the load.
+        by_unit = {"N": force, "N*m": moment, "m": moment - force}
+        relative = by_unit[row.characteristic.unit.removesuffix("/rad")]
         assert part(row, "load") == pytest.approx(-relative * row.number.value, rel=1e-6, abs=1e-9), key
 
 
@@ -215,8 +218,10 @@ def test_the_fit_and_the_rows_are_never_counted_twice() -> None:
 def test_the_sources_of_a_budget_add_up_to_the_value_s_uncertainty() -> None:
     found = characterise(reduced_test(u=(8.0, 0.3), pressure_Pa=234e3), machine=M15, record=None)
     budgeted = [row for row in found.rows if row.SA_rad is None and row.estimate is not None]
-    # Ten of the load, four of each of its directions.
-    assert len(budgeted) == 10 + 2 * 4
+    # Each of the load, and of each of its directions; a relaxation length needs a recording in time.
+    times = {"load": 1, "direction": 2}
+    stepped = [declared for declared in characteristics() if declared.table != TRANSIENT]
+    assert len(budgeted) == sum(times.get(declared.scope, 0) for declared in stepped)
     for row in budgeted:
         assert row.estimate is not None
         assert math.sqrt(sum(u * u for _, u in row.sources)) == pytest.approx(row.estimate.u, rel=1e-12)

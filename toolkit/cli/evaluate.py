@@ -47,8 +47,9 @@ def command(
 
     Example: toolkit evaluate tire.tir grid.csv --axes SAE --out forces.csv
     """
-    from toolkit.lab.answers import findings_text, one_line
+    from toolkit.lab.answers import findings_text
     from toolkit.lab.tire_tests.evaluate import evaluate_grid, grid_rows, grid_text, grid_units, refuse_output
+    from toolkit.listing import one_line
     from toolkit.publication import write_result
     from toolkit.tires.table import read_table
     from toolkit.tires.tir import read_tir

@@ -37,9 +37,9 @@ def command(
     """
     from toolkit.audit.inspection import inspect_file
     from toolkit.errors import ToolkitError
-    from toolkit.lab.answers import one_line
     from toolkit.lab.home import registry_if_any
     from toolkit.lab.tire_tests.inspection_answer import inspection_payload, inspection_text, intervals_of
+    from toolkit.listing import one_line
 
     registry = registry_if_any(place.calibrations, place.home)
     payloads: list[Inspected | UnreadFile] = []

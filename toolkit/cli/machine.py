@@ -101,8 +101,8 @@ def correct(
     from datetime import date
 
     from toolkit.diagnosis.answer.correction import correction_of, machine_of
-    from toolkit.lab.answers import one_line
     from toolkit.lab.starters import refuse_existing
+    from toolkit.listing import one_line
     from toolkit.machine import load_machine
     from toolkit.machine.default import DEFAULT_MACHINE
     from toolkit.machine.definition import next_version

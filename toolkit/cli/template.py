@@ -86,7 +86,7 @@ def check(
 
     Example: toolkit template check report_templates/org.docx
     """
-    from toolkit.lab.answers import one_line
+    from toolkit.listing import one_line
     from toolkit.report.kinds import check as check_template
     from toolkit.report.style import read_style, style_file
     from toolkit.report.word.package import open_package, read_template
@@ -133,7 +133,7 @@ def tags(
     """
     from datetime import UTC, datetime
 
-    from toolkit.lab.answers import table
+    from toolkit.listing import table
     from toolkit.publication import write_result
     from toolkit.report.kinds import TITLES, VOCABULARIES, list_tags
     from toolkit.report.style import read_style, style_file
@@ -232,8 +232,8 @@ def new(
     Example: toolkit template new report_templates/ours.docx --like summary --language fr
     """
     from toolkit.errors import OutputError
-    from toolkit.lab.answers import one_line
     from toolkit.lab.home import packaged_home
+    from toolkit.listing import one_line
     from toolkit.publication import publication
     from toolkit.report.style import style_file, style_in_language
     from toolkit.report.word.package import read_template

@@ -75,9 +75,9 @@ _WORDS: dict[Any, tuple[str, str]] = {
 def merged(*tables: Any, name: str | None = None) -> Any:
     """Return the declaration of an answer that has the keys of several; the text is the first's."""
     entries = {
-        key: held if required else typing.NotRequired[held]
+        key: annotation if required else typing.NotRequired[annotation]
         for table in reversed(tables)
-        for key, held, required in _entries(table)
+        for key, annotation, required in _entries(table)
     }
     joined = TypedDict(name or tables[0].__name__, entries)  # type: ignore[misc]
     joined.__doc__ = tables[0].__doc__
@@ -86,8 +86,8 @@ def merged(*tables: Any, name: str | None = None) -> Any:
 
 def extended(declared: type[T], source: object, /, **more: Any) -> T:
     """Return an answer that is declared as another one and more: fields of that one, the rest stated."""
-    held = {field.name: getattr(source, field.name) for field in dataclasses.fields(cast("Any", source))}
-    return declared(**(held | more))
+    fields = {field.name: getattr(source, field.name) for field in dataclasses.fields(cast("Any", source))}
+    return declared(**(fields | more))
 
 
 def entry_of(declared: type[T], /, *sources: object, **stated: Any) -> T:
@@ -103,10 +103,10 @@ def entry_of(declared: type[T], /, *sources: object, **stated: Any) -> T:
         something is stated that is not declared
     """
     entry, kind = dict(stated), cast("Any", declared)
-    for key, held, required in _entries(kind):
+    for key, annotation, required in _entries(kind):
         source = next((source for source in sources if hasattr(source, key)), None)
         if key not in entry and (required or source is not None):
-            entry[key] = _filled(getattr(source, key), held)
+            entry[key] = _filled(getattr(source, key), annotation)
     if surplus := entry.keys() - {key for key, _, _ in _entries(kind)}:
         raise TypeError(f"{kind.__name__} declares no {', '.join(sorted(surplus))}")
     return cast("T", {key: entry[key] for key, _, _ in _entries(kind) if key in entry})
@@ -141,8 +141,8 @@ def answer_reference(cls: Any, *, described: dict[Any, None] | None = None) -> s
         lines += [f"### {table.__name__}", "", (f"`{place}`: " if place else "") + _summary(table), ""]
         lines += ["| key | holds | meaning |", "|---|---|---|"]
         for key, annotation, required in _entries(table):
-            held, meaning = _bare(annotation)
-            cells = (f"`{key}`", _linked(held), ("" if required else "not always: ") + meaning)
+            annotation, meaning = _bare(annotation)
+            cells = (f"`{key}`", _linked(annotation), ("" if required else "not always: ") + meaning)
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         lines.append("")
     return "\n".join(lines)
@@ -173,7 +173,9 @@ def _entries(cls: Hashable) -> tuple[tuple[str, Any, bool], ...]:
     if is_typeddict(cls):
         hints = typing.get_type_hints(cls, include_extras=True).items()
         # `__required_keys__` does not know the marks of annotations that are kept as texts.
-        return tuple((key, held, get_origin(held) is not typing.NotRequired) for key, held in hints)
+        return tuple(
+            (key, annotation, get_origin(annotation) is not typing.NotRequired) for key, annotation in hints
+        )
     return tuple(
         (output.key, _but_null(output.annotation) if output.sparse else output.annotation, not output.sparse)
         for output in outputs_of(cls)
@@ -182,8 +184,8 @@ def _entries(cls: Hashable) -> tuple[tuple[str, Any, bool], ...]:
 
 def _but_null(annotation: Any) -> Any:
     """Return what a sparse entry holds where it stands: not None."""
-    held, *marks = get_args(annotation)
-    forms = (form for form in get_args(held) if form is not type(None))
+    annotation, *marks = get_args(annotation)
+    forms = (form for form in get_args(annotation) if form is not type(None))
     return Annotated[(functools.reduce(operator.or_, forms), *marks)]
 
 
@@ -251,8 +253,8 @@ def _table_schema(cls: Any, *, document: bool = False) -> dict[str, Any]:
     properties: dict[str, Any] = {"schema": {"const": 1}} if document else {}
     required = list(properties)
     for key, annotation, always in _entries(cls):
-        held, meaning = _bare(annotation)
-        properties[key] = ({"description": meaning} if meaning else {}) | _schema(held)
+        annotation, meaning = _bare(annotation)
+        properties[key] = ({"description": meaning} if meaning else {}) | _schema(annotation)
         required += [key] if always else []
     return {
         "type": "object", "description": _summary(cls), "properties": properties, "required": required,

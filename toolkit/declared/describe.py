@@ -270,16 +270,16 @@ def filled_in(text: str) -> str:
 
 def asked_of(cls: type, values: Mapping[str, Any]) -> dict[str, str]:
     """Return the entries that a new file lacks though it can be read, and who asks for each of them."""
-    return dict(_asked(table_of(cls), values, ""))
+    return dict(_demands(table_of(cls), values, ""))
 
 
-def _asked(kind: TableKind, values: Mapping[str, Any], above: str) -> Iterator[tuple[str, str]]:
+def _demands(kind: TableKind, values: Mapping[str, Any], above: str) -> Iterator[tuple[str, str]]:
     for declared in kind.fields:
         entry, stated = declared.kind.entry, values.get(declared.key)
         if entry.asked and stated is None:
             yield f"{above}{declared.key}", f"{declared.kind.expected}; {entry.asked} asks for it"
         elif isinstance(declared.kind, TableKind) and isinstance(stated or {}, Mapping):
-            yield from _asked(declared.kind, stated or {}, f"{above}{declared.key}.")
+            yield from _demands(declared.kind, stated or {}, f"{above}{declared.key}.")
 
 
 def _outline(cls: type, values: Mapping[str, Any], notes: Notes, root: Root | None) -> str:
@@ -299,18 +299,18 @@ def _entries(
     for declared in offered:
         if declared in below:
             continue
-        yield from _told(declared, notes)
+        yield from _comment_lines(declared, notes)
         if declared.key in values:
             yield f"{key_of(declared.key)} = {value_text(values[declared.key])}"
         else:
             yield f"#{key_of(declared.key)} = {_example(declared, root)}{_mark(declared)}"
     for declared in below:
         yield ""
-        yield from _told(declared, notes)
+        yield from _comment_lines(declared, notes)
         names = (*path, declared.key)
         header, entry = ".".join(map(key_of, names)), values.get(declared.key)
         if isinstance(declared.kind, FormsKind):
-            yield from _chosen(declared.kind, names, entry, root, required=declared.required)
+            yield from _variant_lines(declared.kind, names, entry, root, required=declared.required)
             continue
         inner = _inner_table(declared.kind)
         if isinstance(entry, list):
@@ -351,7 +351,7 @@ def _lacking(inner: TableKind | None, part: Mapping[str, Any], root: Root | None
             yield f"#{key_of(declared.key)} = {example}{_FILL_IN}"
 
 
-def _chosen(
+def _variant_lines(
     kind: FormsKind,
     names: tuple[str, ...],
     entry: Mapping[str, Any] | None,
@@ -361,10 +361,10 @@ def _chosen(
 ) -> Iterator[str]:
     """Return the table that the entry's word chooses; all of them, commented out, where none is chosen."""
     header = ".".join(map(key_of, names))
-    chosen = None if entry is None else kind.tables.get(entry.get(kind.tag or ""))
-    if entry is not None and chosen is not None:
+    table = None if entry is None else kind.tables.get(entry.get(kind.tag or ""))
+    if entry is not None and table is not None:
         yield f"[{header}]"
-        yield from _entries(chosen, names, entry, {}, root)
+        yield from _entries(table, names, entry, {}, root)
         return
     if entry is not None:
         yield from (f"[{header}]", *table_lines(entry, names))
@@ -377,7 +377,7 @@ def _chosen(
         yield from _comment(f"{'or' if at else 'either'} {chosen_by}: {summary(form.cls)}")
         yield f"#{chosen_by}{_FILL_IN if marked else ''}"
         for declared in (field for field in form.fields if field.key != kind.tag):
-            yield from _told(declared, {})
+            yield from _comment_lines(declared, {})
             mark = _FILL_IN if marked and declared.required else ""
             yield f"#{key_of(declared.key)} = {_example(declared, root)}{mark}"
 
@@ -400,10 +400,10 @@ def _is_needed(declared: Field) -> bool:
 def _mark(declared: Field) -> str:
     """Return the mark of an entry that must be stated, or of a table in which one must be."""
     kind = declared.kind
-    asked = kind.entry.asked or (isinstance(kind, TableKind) and next(_asked(kind, {}, ""), None))
+    asked = kind.entry.asked or (isinstance(kind, TableKind) and next(_demands(kind, {}, ""), None))
     return _FILL_IN if declared.required or asked else ""
 
 
-def _told(declared: Field, notes: Notes) -> list[str]:
+def _comment_lines(declared: Field, notes: Notes) -> list[str]:
     note = notes.get(declared.key, "")
     return [*_comment(_sentence(declared)), *_comment(note)]

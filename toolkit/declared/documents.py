@@ -29,16 +29,16 @@ def object_of(cls: type[T], document: Any) -> T:
     ValueError
         an entry is missing or not what is declared; the first that is not
     """
-    return cast("T", _held(document, cls, ""))
+    return cast("T", _structured(document, cls, ""))
 
 
-def _held(value: Any, annotation: Any, place: str) -> Any:
+def _structured(value: Any, annotation: Any, place: str) -> Any:
     """Return a value of JSON as its annotation holds it."""
     kind: Any = annotation
     marks: list[Any] = []
     while get_origin(kind) is Annotated:
-        kind, *more = get_args(kind)
-        marks += more
+        kind, *annotated = get_args(kind)
+        marks += annotated
     if value is None and any(isinstance(mark, NullIsNan) for mark in marks):
         return math.nan
     by_name = any(isinstance(mark, Keyed) for mark in marks)
@@ -47,13 +47,15 @@ def _held(value: Any, annotation: Any, place: str) -> Any:
         return _of_forms(value, inner, annotation, place)
     if by_name and isinstance(value, Mapping):
         held = get_args(inner[0])[1]
-        return tuple((name, _held(entry, held, f"{place}.{name}")) for name, entry in value.items())
+        return tuple((name, _structured(entry, held, f"{place}.{name}")) for name, entry in value.items())
     if origin is tuple and isinstance(value, list) and not by_name:
         kinds = inner[:1] * len(value) if inner[-1] is Ellipsis else inner
         if len(kinds) == len(value):
-            return tuple(_held(*of, f"{place}[{at}]") for at, of in enumerate(zip(value, kinds, strict=True)))
+            return tuple(
+                _structured(*of, f"{place}[{at}]") for at, of in enumerate(zip(value, kinds, strict=True))
+            )
     elif isinstance(origin, type) and issubclass(origin, Mapping) and isinstance(value, Mapping):
-        return {name: _held(entry, inner[1], f"{place}.{name}") for name, entry in value.items()}
+        return {name: _structured(entry, inner[1], f"{place}.{name}") for name, entry in value.items()}
     elif dataclasses.is_dataclass(kind) and isinstance(value, Mapping):
         return _object(cast("type", kind), value, place)
     elif kind is Any or (origin is Literal and value in inner):
@@ -68,14 +70,14 @@ def _held(value: Any, annotation: Any, place: str) -> Any:
 
 def _of_forms(value: Any, forms: tuple[Any, ...], annotation: Any, place: str) -> Any:
     """Return a value as the one of several forms that it has."""
-    told = [form for form in forms if form is not type(None)]
-    if value is None and len(told) < len(forms):
+    alternatives = [form for form in forms if form is not type(None)]
+    if value is None and len(alternatives) < len(forms):
         return None
-    if len(told) == 1:
-        return _held(value, told[0], place)
-    for form in told:
+    if len(alternatives) == 1:
+        return _structured(value, alternatives[0], place)
+    for form in alternatives:
         try:
-            return _held(value, form, place)
+            return _structured(value, form, place)
         except ValueError:
             pass
     raise ValueError(f"{place}: {value!r:.60} is no {words_of(annotation)}")
@@ -88,7 +90,7 @@ def _object(cls: type, table: Mapping[str, Any], place: str) -> Any:
     for name, key, annotation, *_ in outputs_of(cls):
         path = f"{place}.{key}".lstrip(".")
         if name in fields and key in table:
-            entries[name] = _held(table[key], annotation, path)
+            entries[name] = _structured(table[key], annotation, path)
         elif (
             name in fields and (field := fields[name]).default is field.default_factory is dataclasses.MISSING
         ):

@@ -95,8 +95,10 @@ def violations(line: SignedLine, history: History) -> list[str]:
     if moment(time) is None:
         return ["its time is not UTC to the second: in another spelling it would not compare"]
     version = history.at(time, body.get("people"))
-    said = statement(body, line.subject, line.root, version)
-    reasons = [f"its {name!r} is not what it should be" for name in said if body.get(name) != said[name]]
+    derived = statement(body, line.subject, line.root, version)
+    reasons = [
+        f"its {name!r} is not what it should be" for name in derived if body.get(name) != derived[name]
+    ]
     publics: list[PublicKey] = []
     for row in rows:
         try:

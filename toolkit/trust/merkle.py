@@ -88,7 +88,7 @@ def consistency_proof(leaves: Sequence[bytes], size: int) -> list[bytes]:
     """
     if not 0 <= size <= len(leaves):
         raise IndexError(size)
-    return [] if size in (0, len(leaves)) else _subproof(leaves, size, whole=True)
+    return [] if size in (0, len(leaves)) else _subproof(leaves, size, complete=True)
 
 
 def included(leaf: bytes, index: int, size: int, path: Sequence[bytes], root: bytes) -> bool:
@@ -139,13 +139,13 @@ def consistent(old: int, old_root: bytes, new: int, new_root: bytes, path: Seque
     return last == 0 and before == old_root and after == new_root
 
 
-def _subproof(leaves: Sequence[bytes], size: int, *, whole: bool) -> list[bytes]:
+def _subproof(leaves: Sequence[bytes], size: int, *, complete: bool) -> list[bytes]:
     if size == len(leaves):
-        return [] if whole else [root_of(leaves)]
+        return [] if complete else [root_of(leaves)]
     split = _split(len(leaves))
     if size <= split:
-        return [*_subproof(leaves[:split], size, whole=whole), root_of(leaves[split:])]
-    return [*_subproof(leaves[split:], size - split, whole=False), root_of(leaves[:split])]
+        return [*_subproof(leaves[:split], size, complete=complete), root_of(leaves[split:])]
+    return [*_subproof(leaves[split:], size - split, complete=False), root_of(leaves[:split])]
 
 
 def _split(count: int) -> int:

@@ -279,10 +279,10 @@ def _fault(request: Request, body: Mapping[str, Any]) -> str | None:
     subject = body["subject"]
     if {*subject} != {"record", "sha256"} or moment(str(body["time"])) is None:
         return "a message without subject or time"
-    said = statement(body, subject["sha256"], bytes.fromhex(body["extends"]), request.version)
-    for name in said:
-        if body.get(name) != said[name]:
-            return f"{name} {shown(body.get(name))}, and its own parts say {shown(said[name])}"
+    derived = statement(body, subject["sha256"], bytes.fromhex(body["extends"]), request.version)
+    for name in derived:
+        if body.get(name) != derived[name]:
+            return f"{name} {shown(body.get(name))}, and its own parts say {shown(derived[name])}"
     if request.file is not None and sha256_bytes(request.file.encode()) != body.get("file"):
         return "a file that is not the one of the decision"
     return None

@@ -22,8 +22,8 @@ from starlette.responses import HTMLResponse, Response
 from toolkit.calibration.issued import issued_text
 from toolkit.errors import ToolkitError
 from toolkit.estimate import plus_minus, round_uncertainty
-from toolkit.lab.answers import one_line
 from toolkit.lab.desk.holdings import holding_id
+from toolkit.listing import one_line
 from toolkit.report.pages.kit import data, drawn, environment
 from toolkit.words import phrasebook as words
 from toolkit.words.phrasebook import SOURCE, decimal_sign, phrasebook

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from toolkit.declared import json_value
-from toolkit.lab.answers import table
 from toolkit.lab.archives.audit_headline import headline_of
+from toolkit.listing import table
 
 
 def file(grade: str, day: str | None = "2014-03-09", **changes: Any) -> dict[str, Any]:

@@ -65,7 +65,7 @@ class Authority:
             stamps = x509.ExtendedKeyUsage([x509.oid.ExtendedKeyUsageOID.TIME_STAMPING])
             builder = builder.add_extension(stamps, critical=True)
         certificate = builder.sign(self.private, digest or hashes.SHA256())
-        return SealKey(private=private, certificate=certificate, others=(*between, self.certificate))
+        return SealKey(private=private, certificate=certificate, intermediates=(*between, self.certificate))
 
     def revoke(self, key: SealKey, *, on: dt.datetime) -> x509.CertificateRevocationList:
         """Return a revocation list with one certificate."""
@@ -97,13 +97,15 @@ def to_pem(key: SealKey, passphrase: bytes | None = None) -> bytes:
     """Return a key with its chain as one PEM file."""
     lock = BestAvailableEncryption(passphrase) if passphrase else NoEncryption()
     private: bytes = key.private.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, lock)
-    return private + b"".join(c.public_bytes(Encoding.PEM) for c in (key.certificate, *key.others))
+    return private + b"".join(c.public_bytes(Encoding.PEM) for c in (key.certificate, *key.intermediates))
 
 
 def to_pkcs12(key: SealKey, passphrase: bytes) -> bytes:
     """Return a key with its chain as PKCS #12."""
     lock = BestAvailableEncryption(passphrase)
-    return pkcs12.serialize_key_and_certificates(b"seal", key.private, key.certificate, key.others, lock)
+    return pkcs12.serialize_key_and_certificates(
+        b"seal", key.private, key.certificate, key.intermediates, lock
+    )
 
 
 def _builder(

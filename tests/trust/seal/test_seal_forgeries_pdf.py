@@ -237,7 +237,7 @@ def test_the_laboratorys_certificate_beside_a_strangers_key_is_no_signature() ->
 
 def test_a_certificate_of_the_laboratory_cannot_issue_others() -> None:
     below = Authority(certificate=key().certificate, private=key().private).issue("Below")
-    signer = SealKey(private=below.private, certificate=below.certificate, others=(key().certificate,))
+    signer = SealKey(private=below.private, certificate=below.certificate, intermediates=(key().certificate,))
     assert _checked(_sealed_by(signer)).signature == "untrusted"
 
 
@@ -321,7 +321,9 @@ def test_a_weak_digest_is_no_seal(digest: str) -> None:
 
 def test_a_certificate_that_does_not_belong_to_the_path_is_refused() -> None:
     signer = SealKey(
-        private=key().private, certificate=key().certificate, others=(authority().issue("Other").certificate,)
+        private=key().private,
+        certificate=key().certificate,
+        intermediates=(authority().issue("Other").certificate,),
     )
     check = _checked(_sealed_by(signer))
     assert check.signature == "untrusted"

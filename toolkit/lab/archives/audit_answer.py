@@ -18,8 +18,9 @@ from toolkit.calibration.registry.registry import RefusedRecord, Registry
 from toolkit.calibration.registry.standing import approved_after
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import ErrorEntry, counted, one_line, table
+from toolkit.lab.answers import ErrorEntry, counted
 from toolkit.lab.archives.audit_headline import Headline, headline
+from toolkit.listing import one_line, table
 
 if TYPE_CHECKING:
     import datetime as dt

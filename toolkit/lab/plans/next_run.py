@@ -18,8 +18,9 @@ from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import document_text, table
+from toolkit.lab.answers import document_text
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
+from toolkit.listing import table
 from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
 if TYPE_CHECKING:

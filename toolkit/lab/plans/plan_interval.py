@@ -12,8 +12,9 @@ from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import document_text, findings_text, table
+from toolkit.lab.answers import document_text, findings_text
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
+from toolkit.listing import or_dash, table
 from toolkit.planning.interval import IntervalPlan
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ def _text(plan: PlanIntervalAnswer, findings: list[Finding]) -> str:
             ["days", "beyond the tolerance", "sessions a year", "tests recalled a year"],
             [
                 [str(risk.days), f"{100 * risk.beyond:.1f} %", f"{risk.sessions_a_year:.2g}",
-                 "-" if risk.recalled_a_year is None else f"{risk.recalled_a_year:.3g}"]
+                 or_dash(risk.recalled_a_year, ".3g")]
                 for risk in sorted({*plan.risks, plan.chosen}, key=lambda risk: risk.days)
             ],
             align=">>>>",

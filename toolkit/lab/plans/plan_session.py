@@ -15,8 +15,9 @@ from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import reads_as_number
-from toolkit.lab.answers import document_text, findings_text, one_line, table
+from toolkit.lab.answers import document_text, findings_text
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
+from toolkit.listing import one_line, or_dash, table
 from toolkit.planning.session_plan import PlannedLoad, SessionPlan
 
 if TYPE_CHECKING:
@@ -253,7 +254,7 @@ def plan_text(plan: SessionPlan, record: CalibrationRecord) -> str:
             [
                 [load.load, f"{load.at:.5g}", round_uncertainty(load.U_today),
                  round_uncertainty(load.U_repeated),
-                 "-" if load.U_asked is None else f"{load.U_asked:.3g}",
+                 or_dash(load.U_asked, ".3g"),
                  round_uncertainty(load.U_expected), round_uncertainty(load.U),
                  round_uncertainty(load.U_in_nine_of_ten),
                  "-" if load.share is None else f"{100 * load.share:.0f} %", load.unit]

@@ -11,6 +11,7 @@ from toolkit.declared import Entry
 from toolkit.estimate import round_uncertainty
 from toolkit.lab.answers import DeliveredDocument, Timing
 from toolkit.lab.home import PLAN
+from toolkit.listing import or_dash
 from toolkit.planning.demands import PrintedUnits, title_of
 from toolkit.planning.sweep_plan import sweep_lines
 from toolkit.report.content import Curve, Plot
@@ -112,7 +113,7 @@ def session_sheet(plan: SessionPlan, record: CalibrationRecord, issued: dt.date)
             Expected(
                 quantity=load.load, at=f"{load.at:.5g}", unit=printed(load.unit),
                 reference=round_uncertainty(load.U_today),
-                asked="-" if load.U_asked is None else f"{load.U_asked:.3g}",
+                asked=or_dash(load.U_asked, ".3g"),
                 expected=round_uncertainty(load.U_expected),
                 span=f"< {round_uncertainty(load.U_in_nine_of_ten)} in 9 of 10",
             )
@@ -246,7 +247,7 @@ def interval_sheet(
         issued=issued,
         risks=tuple(
             (str(risk.days), f"{100 * risk.beyond:.1f}", f"{risk.sessions_a_year:.2g}",
-             "-" if risk.recalled_a_year is None else f"{risk.recalled_a_year:.3g}")
+             or_dash(risk.recalled_a_year, ".3g"))
             for risk in risks
         ),
         plots=(_risk_plot(risks, plan.reliability),),

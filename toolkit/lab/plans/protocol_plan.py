@@ -16,9 +16,10 @@ from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
 from toolkit.files import real_path
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import document_text, table
+from toolkit.lab.answers import document_text
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.lab.tire_tests.resolve import Basis, Resolved, resolve_test
+from toolkit.listing import table
 from toolkit.planning.demands import Demand, PrintedUnits, load_of, nominal_loads
 from toolkit.planning.protocol_plan import PlannedValue, ProtocolPlan
 

@@ -262,7 +262,8 @@ def apply_answer(
     step: Callable[[str], None] = lambda _text: None,
 ) -> tuple[ApplyAnswer, str, Loads]:
     """Compute a file's loads by a record and write them; return both forms of the answer, and the loads."""
-    from toolkit.lab.answers import finding_lines, one_line
+    from toolkit.lab.answers import finding_lines
+    from toolkit.listing import one_line
 
     check_output(out)
     step("reading")

@@ -12,7 +12,8 @@ from toolkit.calibration.uncertainty.monte_carlo import MonteCarloCheck
 from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError, ToolkitError
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import finding_lines, table
+from toolkit.lab.answers import finding_lines
+from toolkit.listing import table
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit

@@ -17,8 +17,8 @@ from toolkit.lab.answers import (
     delivered_keys,
     file_name,
     finding_lines,
-    one_line,
 )
+from toolkit.listing import one_line
 from toolkit.trust.signing import HERE
 
 if TYPE_CHECKING:

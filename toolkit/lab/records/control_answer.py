@@ -18,7 +18,8 @@ from toolkit.calibration.standards.iso376 import Iso376Result
 from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError, SessionError, ToolkitError
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import finding_lines, table
+from toolkit.lab.answers import finding_lines
+from toolkit.listing import or_dash, table
 
 StandardEvaluation = TypedDict(
     "StandardEvaluation",
@@ -272,20 +273,16 @@ def _e74(result: E74Result, force: str, reading: str) -> list[str]:
 
 def _iso376(result: Iso376Result, force: str, reading: str) -> list[str]:
     rows = [
-        [f"{r.force:g}", f"{r.deflection:.6g}", _percent(r.b), _percent(r.b_same), _percent(r.fc),
-         _percent(r.v), (r.class_name or "none") if not result.procedure else "-"]
+        [f"{r.force:g}", f"{r.deflection:.6g}", *(or_dash(e, ".4f") for e in (r.b, r.b_same, r.fc, r.v)),
+         (r.class_name or "none") if not result.procedure else "-"]
         for r in result.forces
     ]  # fmt: skip
     return [
         table([f"force [{force}]", f"deflection [{reading}]", "b %", "b' %", "fc %", "v %", "class"], rows,
               align=">>>>>>>"),
-        f"zero f0 {_percent(result.f0)} %, creep c {_percent(result.c)} %",
+        f"zero f0 {or_dash(result.f0, '.4f')} %, creep c {or_dash(result.c, '.4f')} %",
         *(f"class {r.class_name}: {r.lower:g} to {r.upper:g} {force}" for r in result.ranges),
     ]  # fmt: skip
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4f}"
 
 
 def evaluate_record(

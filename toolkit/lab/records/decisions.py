@@ -15,8 +15,9 @@ from toolkit.calibration.registry.status import RecordStatus
 from toolkit.calibration.registry.verify import VerifiedRecord, verify_registry
 from toolkit.declared.answers import entry_of
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import finding_lines, table
+from toolkit.lab.answers import finding_lines
 from toolkit.lab.records.registry_answer import RecordRow, record_row, void_day
+from toolkit.listing import table
 
 
 class VerifyRegistryAnswer(TypedDict):

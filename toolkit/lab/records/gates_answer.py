@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 
 from toolkit.calibration.control.as_found import AsFoundLoad
 from toolkit.declared.answers import entry_of
-from toolkit.lab.answers import table
+from toolkit.listing import or_dash, table
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry
@@ -226,12 +226,12 @@ def full_record(registry: Registry, record_id: str) -> tuple[FullRecord, str]:
     found = as_found_answer(registry, record_id) if registry.load(record_id).kind == "fit" else None
     rows = [[gate["state"], gate["rule"], gate["where"], gate["message"]] for gate in judged["gates"]]
     responses = [
-        [row["load"], row["indication"], _digits(row["value"]), _digits(row["before"]), row["unit"],
-         _digits(row["change_percent"])]
+        [row["load"], row["indication"], or_dash(row["value"], ".6g"), or_dash(row["before"], ".6g"),
+         row["unit"], or_dash(row["change_percent"], ".6g")]
         for row in compared["responses"]
     ]  # fmt: skip
     errors = [
-        [row.load, _digits(row.max_error), _digits(row.tolerance), row.unit,
+        [row.load, or_dash(row.max_error, ".6g"), or_dash(row.tolerance, ".6g"), row.unit,
          "within" if row.within else "OUT"]
         for row in (found["loads"] if found else ())
     ]  # fmt: skip
@@ -243,7 +243,3 @@ def full_record(registry: Registry, record_id: str) -> tuple[FullRecord, str]:
           if errors else []),
     ])  # fmt: skip
     return {"judged": judged, "responses": compared, "as_found": found}, text
-
-
-def _digits(value: float | None) -> str:
-    return "-" if value is None else f"{value:.6g}"

@@ -12,8 +12,8 @@ from toolkit.calibration.registry.standing import approved_after
 from toolkit.calibration.uncertainty.common_errors import standard_errors
 from toolkit.declared.answers import entry_of
 from toolkit.estimate import round_uncertainty
-from toolkit.lab.answers import table
 from toolkit.lab.records.gates_answer import Found, Judged, Responses
+from toolkit.listing import or_dash, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -293,10 +293,10 @@ def difference(registry: Registry, first: str, second: str) -> tuple[dict[str, A
         ["load", "term", first, second, "change", "change %", "moves at most", "% of full scale"],
         [
             [
-                t.load, t.term, _digits(t.one), _digits(t.other), _digits(t.change),
-                "-" if t.change_percent is None else f"{t.change_percent:+.3g}",
+                t.load, t.term, or_dash(t.one, ".10g"), or_dash(t.other, ".10g"), or_dash(t.change, ".10g"),
+                or_dash(t.change_percent, "+.3g"),
                 "-" if t.effect is None else f"{t.effect:.4g} {t.unit}",
-                "-" if t.effect_percent_fs is None else f"{t.effect_percent_fs:.3g}",
+                or_dash(t.effect_percent_fs, ".3g"),
             ]
             for t in terms
         ],
@@ -309,10 +309,6 @@ def difference(registry: Registry, first: str, second: str) -> tuple[dict[str, A
     if any(t.change and t.effect is None for t in terms):
         text += "\n\nno effect is given where neither record holds a range: a legacy import has none"
     return {"records": [first, second], "terms": rows}, text, any(t.differs for t in terms)
-
-
-def _digits(value: float | None) -> str:
-    return "-" if value is None else f"{value:.10g}"
 
 
 def _plainly(value: object) -> object:

@@ -10,7 +10,8 @@ from toolkit.declared.answers import entry_of
 from toolkit.errors import SessionError, ToolkitError
 from toolkit.estimate import round_uncertainty
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import counted, finding_lines, table
+from toolkit.lab.answers import counted, finding_lines
+from toolkit.listing import table
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -175,7 +175,7 @@ def set_demand(
 
 def people_answer(log: PeopleLog) -> tuple[PeopleAnswer, str]:
     """Return who is enrolled, as a payload and for people."""
-    from toolkit.lab.answers import table
+    from toolkit.listing import table
 
     version = log.history.now
     if version is None:

@@ -20,7 +20,6 @@ from toolkit.declared.answers import merged
 from toolkit.errors import ToolkitError, TrustError
 from toolkit.files import parse_json, sha256_bytes
 from toolkit.inputs import PDF_FILE, read_regular
-from toolkit.lab.answers import one_line
 from toolkit.lab.signatures.proofs import (
     MANIFEST,
     PROOF,
@@ -38,6 +37,7 @@ from toolkit.lab.signatures.proofs import (
     reports_test,
     statements_hash,
 )
+from toolkit.listing import one_line
 from toolkit.trust.anchor import COMPACT, Anchor, parse_anchor
 from toolkit.trust.seal.check import SealCheck, Signature
 from toolkit.trust.seal.pdf import carried_by, check_pdf

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 from toolkit.declared import Entry, answer
 from toolkit.declared.answers import extended
 from toolkit.diagnosis.answer.answer import Diagnosis
-from toolkit.lab.answers import DeliveredDocument, Timing, delivered_keys, draft_keys, finding_lines, table
+from toolkit.lab.answers import DeliveredDocument, Timing, delivered_keys, draft_keys, finding_lines
+from toolkit.listing import or_dash, table
 from toolkit.units import with_unit
 
 if TYPE_CHECKING:
@@ -278,7 +279,7 @@ def diagnosis_text(diagnosis: Diagnosis, out: Path) -> str:
             *(f"{v:.4g}" for v in (o.nominal_rmse, o.refitted_rmse, o.augmented_rmse)),
             *([] if o.with_laws_rmse is None else [f"{o.with_laws_rmse:.4g}"]),
             f"{o.noise_floor:.4g}",
-            "-" if o.sensor_sd is None else f"{o.sensor_sd:.4g}",
+            or_dash(o.sensor_sd, ".4g"),
         ]
         for o in diagnosis.fit.held_out
     ]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from toolkit.effects.applied import SimulatedEffect
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import finding_lines, one_line
+from toolkit.lab.answers import finding_lines
+from toolkit.listing import one_line
 
 if TYPE_CHECKING:
     from toolkit.calibration.registry.registry import Registry

@@ -12,7 +12,8 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from toolkit.errors import ConfigError
-from toolkit.lab.answers import Timing, document_table, document_text, findings_text, one_line
+from toolkit.lab.answers import Timing, document_table, document_text, findings_text
+from toolkit.listing import one_line
 
 if TYPE_CHECKING:
     from datetime import date

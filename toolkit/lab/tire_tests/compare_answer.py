@@ -23,8 +23,8 @@ from toolkit.lab.answers import (
     finding_lines,
     mark_words,
     signature_words,
-    table,
 )
+from toolkit.listing import table
 
 if TYPE_CHECKING:
     from toolkit.comparison.model import Comparison, Difference, Entry, Precision, Repeats

@@ -10,8 +10,9 @@ from toolkit.calibration.records.use import UsedRecord
 from toolkit.declared.answers import entry_of
 from toolkit.estimate import Estimate, plus_minus
 from toolkit.findings import Finding, FindingEntry
-from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words, table
+from toolkit.lab.answers import Timing, draft_keys, findings_text, mark_words, signature_words
 from toolkit.lab.tire_tests.fit_models import Fitted
+from toolkit.listing import or_dash, table
 from toolkit.tires.comparison import Comparison
 from toolkit.tires.global_model import GlobalFit
 from toolkit.tires.model import CurveFit
@@ -271,10 +272,10 @@ def comparison_text(comparison: Comparison) -> str:
         floor = floors.get(channel)
         label = f"{_WORDS[condition]} {channel}"
         errors = ["-" if entry is None else f"{entry.error_percent:.2f}" for entry in entries]
-        lines.append([label, *errors, "-" if floor is None else f"{floor:.2f}"])
+        lines.append([label, *errors, or_dash(floor, ".2f")])
         away = [None if entry is None else entry.prediction_error_percent for entry in entries]
         if any(value is not None for value in away):
-            cells = ["-" if value is None else f"{value:.2f}" for value in away]
+            cells = [or_dash(value, ".2f") for value in away]
             lines.append([f"  {channel}, load left out", *cells, ""])
     if seconds := dict(comparison.seconds):
         cells = [f"{seconds[model]:.2f}" if model in seconds else "-" for model in comparison.models]
@@ -338,7 +339,7 @@ def _line(fit: CurveFit, rotation: str | None) -> list[str]:
         rotation or "-",
         str(fit.n),
         f"{fit.error_percent:.2f}",
-        "-" if fit.scatter_floor_percent is None else f"{fit.scatter_floor_percent:.2f}",
+        or_dash(fit.scatter_floor_percent, ".2f"),
         "-" if fit.slope_at_zero is None else _stiffness(fit.slope_at_zero, fit),
         *cells,
         "yes" if fit.converged else "no",

@@ -11,7 +11,8 @@ from toolkit.audit.model import DisagreeingSides, Repair, SkippedRecord
 from toolkit.calibration.registry.registry import RefusedRecord
 from toolkit.declared.answers import entry_of, merged
 from toolkit.findings import FindingEntry
-from toolkit.lab.answers import finding_lines, one_line, table
+from toolkit.lab.answers import finding_lines
+from toolkit.listing import one_line, table
 
 if TYPE_CHECKING:
     from toolkit.audit.estimate import Interval

@@ -20,10 +20,9 @@ from toolkit.lab.answers import (
     draft_keys,
     finding_lines,
     mark_words,
-    one_line,
     signature_words,
-    table,
 )
+from toolkit.listing import one_line, table
 
 if TYPE_CHECKING:
     from toolkit.characteristics.model import Point

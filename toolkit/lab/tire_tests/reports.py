@@ -23,8 +23,8 @@ from toolkit.lab.answers import (
     finding_lines,
     mark_words,
     needs_attention,
-    one_line,
 )
+from toolkit.listing import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

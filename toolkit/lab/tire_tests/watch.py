@@ -61,8 +61,8 @@ class WatchLog:
 
     def add(self, look: Round, say: Callable[[str], None]) -> None:
         """Say what is new in a look."""
-        from toolkit.lab.answers import one_line
         from toolkit.lab.tire_tests.reports import attention, named_payload
+        from toolkit.listing import one_line
 
         for report in look.made:
             self.attention += attention(report)

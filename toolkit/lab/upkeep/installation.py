@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, TypedDict
 
 from toolkit.errors import RenderError
-from toolkit.lab.answers import table
+from toolkit.listing import table
 from toolkit.qualification.model import Check, QualificationRecord
 from toolkit.report.word.office import SOFFICE, find_soffice
 from toolkit.system import is_administrator

@@ -18,9 +18,9 @@ from toolkit.declared import Entry, Format, read_text, toml_text
 from toolkit.errors import ConfigError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import SETTINGS_FILE, TEMPLATE_FILE, is_regular, read_input
-from toolkit.lab.answers import table
 from toolkit.lab.home import find_home
 from toolkit.lab.upkeep.kept_files import MIGRATIONS, KeptFile, kept_files
+from toolkit.listing import table
 from toolkit.publication import publication, settle
 from toolkit.version import __version__
 

@@ -11,6 +11,7 @@ import numpy as np
 from toolkit.calibration.fit.balance_report import BalanceLoad, BalanceReport
 from toolkit.calibration.fit.report import Coefficient, FitReport
 from toolkit.estimate import plus_minus, round_uncertainty
+from toolkit.listing import or_dash, table
 
 # Cook's distance over 4/n and a leverage over twice the mean are looked at (Cook and Weisberg, 1982).
 _MOST_ROWS = 12
@@ -96,7 +97,7 @@ def report_text(report: FitReport) -> str:
         f"{report.load} [{unit}]  {report.n} rows, {report.dof} degrees of freedom, full scale "
         f"{report.full_scale:.6g} {unit}",
         "",
-        _table(
+        table(
             ["term", "coefficient", "std error", "t", "sign sure", fs],
             [
                 [c.term, f"{c.value:.8g}", round_uncertainty(c.standard_error), f"{c.t:.1f}",
@@ -106,7 +107,7 @@ def report_text(report: FitReport) -> str:
         ),
         "",
         "correlation of the coefficients",
-        _table(
+        table(
             ["", *(c.term for c in report.coefficients)],
             [
                 [c.term, *(f"{v:+.2f}" for v in row[: i + 1]), *("" for _ in row[i + 1 :])]
@@ -137,7 +138,7 @@ def balance_text(report: BalanceReport) -> str:
         "balance form (AIAA R-091): responses fitted on the loads, loads found by iteration; the record "
         "holds the direct form",
         "",
-        _table(
+        table(
             ["term", *form.responses],
             [
                 [term, *(f"{value:.6g}" for value in column)]
@@ -150,13 +151,13 @@ def balance_text(report: BalanceReport) -> str:
     rows = [
         [load.load, f"{load.direct_sd_percent_fs:.3g}", f"{load.direct_max_percent_fs:.3g}",
          f"{load.iterated_sd_percent_fs:.3g}", f"{load.iterated_max_percent_fs:.3g}",
-         _or_dash(load.check_direct_percent_fs), _or_dash(load.check_iterated_percent_fs)]
+         or_dash(load.check_direct_percent_fs, ".3g"), or_dash(load.check_iterated_percent_fs, ".3g")]
         for load in report.loads
     ]  # fmt: skip
     header = ["% FS", "direct sd", "max", "iterated sd", "max", "check direct", "check iterated"]
     lines += [
         "",
-        _table(header, rows),
+        table(header, rows),
         f"load iteration: {report.steps} steps; Newton: {report.newton_steps}, largest difference "
         f"{100 * report.newton_difference:.1g} % of full scale",
     ]
@@ -164,7 +165,7 @@ def balance_text(report: BalanceReport) -> str:
         kind = "counted from the runs' mean" if tares.relative else "counted from the natural zero"
         lines += ["", f"tare loads by run, {kind} ({tares.steps} steps)"]
         lines.append(
-            _table(
+            table(
                 ["run", *(f"{load.load} [{load.unit}]" for load in report.loads)],
                 [
                     [str(run), *(plus_minus(v, u) for v, u in zip(row, errors, strict=True))]
@@ -213,7 +214,7 @@ def _rows(report: FitReport) -> str:
     if not len(interest):
         return "  none: no outlier, no leverage over twice the mean, no Cook's distance over 4/n"
     order = interest[np.argsort(-report.cook[interest])][:_MOST_ROWS]
-    text = _table(
+    text = table(
         ["row", "reference", "residual", "leverage", "internal", "external", "Cook", "weight", "why"],
         [
             [str(i + 1), f"{report.reference[i]:.6g}", f"{report.residuals[i]:+.3g}",
@@ -232,7 +233,7 @@ def _checks(report: FitReport) -> str:
     reference, off = report.check_reference, report.check_percent_fs
     if reference is None or off is None:
         return ""
-    return _table(
+    return table(
         [
             "row",
             f"reference [{report.unit}]",
@@ -248,7 +249,7 @@ def _checks(report: FitReport) -> str:
 
 def _reversals(report: FitReport) -> str:
     worst = sorted(report.reversals, key=lambda r: -abs(r.percent_fs))[:_MOST_ROWS]
-    text = _table(
+    text = table(
         ["run", f"load [{report.unit}]", f"down - up [{report.unit}]", "% FS"],
         [
             [
@@ -273,20 +274,6 @@ def _near_one(value: float) -> str:
     return f"1 - {1 - value:.2g}" if 0 < 1 - value < 1e-3 else f"{value:.6f}"
 
 
-def _or_dash(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
-
-
 def _pairs(rows: Sequence[tuple[str, str]]) -> list[str]:
     width = max(len(name) for name, _ in rows)
     return [f"{name:<{width}}  {value}" for name, value in rows]
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> str:
-    align = align or "<" + ">" * (len(header) - 1)
-    widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
-    lines = [
-        "  ".join(f"{cell:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True))
-        for row in [header, ["-" * width for width in widths], *rows]
-    ]
-    return "\n".join(line.rstrip() for line in lines)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.files import reads_as_number
+from toolkit.listing import or_dash
 from toolkit.report.certificate.content import CERTIFICATE, GAP, signed
 from toolkit.report.certificate.model import MOST_FIGURES, VERDICTS, Certificate, LoadResult
 from toolkit.report.content import Cell, Curve, Plot
@@ -49,10 +50,6 @@ def _dof(dof: float) -> str:
     return f"{dof:.0f}" if math.isfinite(dof) and dof < 1e4 else "∞"
 
 
-def _g(value: float | None) -> str:
-    return "-" if value is None else f"{value:.6g}"
-
-
 @_table(
     "cells",
     "the indications: one row a cell",
@@ -68,8 +65,8 @@ def _g(value: float | None) -> str:
 def cells(c: Certificate) -> Texts:
     """Return the indications."""
     for cell, resolution in zip(c.cells, c.resolutions, strict=True):
-        ends = _g(cell.minimum), _g(cell.maximum)
-        yield cell.name, cell.serial or GAP, printed(cell.unit), *ends, _g(resolution)
+        ends = or_dash(cell.minimum, ".6g"), or_dash(cell.maximum, ".6g")
+        yield cell.name, cell.serial or GAP, printed(cell.unit), *ends, or_dash(resolution, ".6g")
 
 
 @_table(

@@ -26,7 +26,7 @@ class Sealed:
     """
 
     signer: x509.Certificate
-    others: tuple[x509.Certificate, ...]
+    intermediates: tuple[x509.Certificate, ...]
     at: dt.datetime
     stamped: bool = False
     content: bytes = field(default=b"", repr=False)
@@ -66,7 +66,7 @@ class SealCheck:
 def judged(sealed: Sealed, trust: Trust, *, now: dt.datetime | None = None) -> SealCheck:
     """Return the check of a document whose signature holds: whether its signer is trusted."""
     judgement: Judgement = judge(
-        sealed.signer, sealed.others, trust, at=sealed.at, stamped=sealed.stamped, now=now
+        sealed.signer, sealed.intermediates, trust, at=sealed.at, stamped=sealed.stamped, now=now
     )
     intact = judgement.state != "invalid"
     return SealCheck(

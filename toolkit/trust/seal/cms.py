@@ -35,7 +35,7 @@ class Message:
     """
 
     signer: x509.Certificate
-    others: tuple[x509.Certificate, ...]
+    intermediates: tuple[x509.Certificate, ...]
     value: bytes
     at: dt.datetime | None
     stamp: bytes | None
@@ -68,7 +68,7 @@ def check_message(message: bytes, parts: Iterable[bytes]) -> Message:
     at, unsigned = attributes.get("signing_time"), info["unsigned_attrs"]
     return Message(
         signer=load_certificate(signer.dump()),
-        others=tuple(load_certificate(c.dump()) for c in certificates if c is not signer),
+        intermediates=tuple(load_certificate(c.dump()) for c in certificates if c is not signer),
         value=info["signature"].native,
         at=None if at is None else at.native,
         stamp=unsigned[0]["values"][0].dump() if unsigned.native else None,

@@ -32,12 +32,12 @@ class SealKey:
 
     private: Any = field(repr=False)
     certificate: x509.Certificate
-    others: tuple[x509.Certificate, ...] = ()
+    intermediates: tuple[x509.Certificate, ...] = ()
 
     @property
     def chain(self) -> tuple[x509.Certificate, ...]:
         """The certificates that go into a seal: the signer's first, no self-signed root."""
-        return (self.certificate, *(c for c in self.others if c.issuer != c.subject))
+        return (self.certificate, *(c for c in self.intermediates if c.issuer != c.subject))
 
     @property
     def name(self) -> str:
@@ -102,15 +102,15 @@ def open_key(
             "the key is of a kind that cannot seal both PDF and XML", path, type(private).__name__,
             "an RSA key, or one of an elliptic curve", "ask for a certificate of such a key", "seal-key",
         )  # fmt: skip
-    others = tuple(c for c in certificates if c != certificate)
-    if reason := objection(certificate, others, trust or Trust(), now=dt.datetime.now(dt.UTC)):
+    intermediates = tuple(c for c in certificates if c != certificate)
+    if reason := objection(certificate, intermediates, trust or Trust(), now=dt.datetime.now(dt.UTC)):
         raise _refused(
             "the laboratory's certificate cannot seal today", path, reason,
             "a certificate that is valid today and not revoked: RSA from 3072 bits or a curve from 256, "
             "signed by SHA-256 or better",
             "ask for a new certificate; nothing was sealed", "seal-certificate",
         )  # fmt: skip
-    return SealKey(private=private, certificate=certificate, others=others)
+    return SealKey(private=private, certificate=certificate, intermediates=intermediates)
 
 
 def _parts(data: bytes, passphrase: bytes | None) -> tuple[Any, tuple[x509.Certificate, ...]]:
@@ -120,7 +120,7 @@ def _parts(data: bytes, passphrase: bytes | None) -> tuple[Any, tuple[x509.Certi
         inside = b"-----BEGIN CERTIFICATE-----" in data
         return private, tuple(x509.load_pem_x509_certificates(data)) if inside else ()
     try:
-        key, certificate, others = pkcs12.load_key_and_certificates(data, passphrase)
+        key, certificate, intermediates = pkcs12.load_key_and_certificates(data, passphrase)
     except ValueError as error:
         # Of an encrypted file without a passphrase it says "invalid password".
         if passphrase is None and "password" in str(error).lower():
@@ -128,7 +128,7 @@ def _parts(data: bytes, passphrase: bytes | None) -> tuple[Any, tuple[x509.Certi
         raise
     if key is None:
         raise ValueError("the file holds no private key")
-    return key, tuple(c for c in (certificate, *others) if c is not None)
+    return key, tuple(c for c in (certificate, *intermediates) if c is not None)
 
 
 def _public(key: Any) -> bytes:

@@ -193,7 +193,7 @@ def _read(data: bytes, trust: Trust) -> Sealed | None:
     if at.tzinfo is None:
         raise Forged("the signature states no time")
     return Sealed(
-        signer=message.signer, others=message.others, at=at, stamped=stamped,
+        signer=message.signer, intermediates=message.intermediates, at=at, stamped=stamped,
         attachments=attachments_of(reader),
     )  # fmt: skip
 

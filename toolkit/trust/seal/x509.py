@@ -121,7 +121,7 @@ def load_certificate(der: bytes) -> x509.Certificate:
 
 def judge(
     signer: x509.Certificate,
-    others: Sequence[x509.Certificate],
+    intermediates: Sequence[x509.Certificate],
     trust: Trust,
     *,
     at: dt.datetime,
@@ -132,7 +132,7 @@ def judge(
 
     Parameters
     ----------
-    signer, others : the certificate that verified the seal, and those that came with it
+    signer, intermediates : the certificate that verified the seal, and those that came with it
     at : time of the seal; as the signer states it, unless ``stamped``
     stamped : a trusted time stamp proves ``at``
     now : the present time, default the system's
@@ -140,7 +140,7 @@ def judge(
     now = now or dt.datetime.now(dt.UTC)
     if at > now + AHEAD:
         return Judgement(state="untrusted", why=f"sealed in the future, {_stamp(at)}")
-    path = _path(signer, others, trust, at)
+    path = _path(signer, intermediates, trust, at)
     if isinstance(path, str):
         # Too weak tells more than unknown: anybody could have made it.
         weakness = weak_certificate(signer)
@@ -150,7 +150,7 @@ def judge(
             return Judgement(state="invalid", why=weakness)
         if reason := _outside(certificate, at) or _revoked(certificate, path, trust, at, stamped=stamped):
             return Judgement(state="untrusted", why=reason)
-    if strangers := [_name(c) for c in others if c not in path and c not in trust.certificates]:
+    if strangers := [_name(c) for c in intermediates if c not in path and c not in trust.certificates]:
         return Judgement(
             state="untrusted", why=f"a certificate that does not belong to its path: {strangers[0]}"
         )
@@ -158,13 +158,13 @@ def judge(
 
 
 def objection(
-    signer: x509.Certificate, others: Sequence[x509.Certificate], trust: Trust, *, now: dt.datetime
+    signer: x509.Certificate, intermediates: Sequence[x509.Certificate], trust: Trust, *, now: dt.datetime
 ) -> str:
     """Return why what a signer seals now would not be trusted, else nothing.
 
     Where no path leads to a trusted certificate the signer's alone is asked: whom others trust, they know.
     """
-    found = _path(signer, others, trust, now)
+    found = _path(signer, intermediates, trust, now)
     path = (signer,) if isinstance(found, str) else found
     for certificate in path:
         reason = (
@@ -229,7 +229,7 @@ def _name(certificate: x509.Certificate) -> str:
 
 
 def _path(
-    signer: x509.Certificate, others: Sequence[x509.Certificate], trust: Trust, at: dt.datetime
+    signer: x509.Certificate, intermediates: Sequence[x509.Certificate], trust: Trust, at: dt.datetime
 ) -> tuple[x509.Certificate, ...] | str:
     from asn1crypto import x509 as asn1
     from pyhanko_certvalidator import CertificateValidator, ValidationContext
@@ -252,7 +252,7 @@ def _path(
             revocation_mode="soft-fail",
         )
         validator = CertificateValidator(
-            as_asn1([signer])[0], intermediate_certs=as_asn1(others), validation_context=context
+            as_asn1([signer])[0], intermediate_certs=as_asn1(intermediates), validation_context=context
         )
         usage = {"digital_signature"} if _may(signer, "digital_signature") else {"non_repudiation"}
         validated = asyncio.run(validator.async_validate_usage(usage))

@@ -157,7 +157,9 @@ def _signature(data: bytes, root: Any) -> Sealed:
     )
     if properties.findtext(f".//{{{XADES}}}DataObjectFormat/{{{XADES}}}Description") == EXACT:
         _demand_exact(data, root, signature)
-    return Sealed(signer=signer, others=certificates[1:], at=_signing_time(properties), content=content)
+    return Sealed(
+        signer=signer, intermediates=certificates[1:], at=_signing_time(properties), content=content
+    )
 
 
 def _only_signature(root: Any) -> Any:
