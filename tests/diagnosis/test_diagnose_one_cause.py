@@ -1,4 +1,4 @@
-"""A cause keeps its name: in the runs of a condition, in its own unit, and beside laws that are its formula."""
+"""A cause keeps its name: in the runs of a condition, in its own unit, beside laws of its own formula."""
 
 from __future__ import annotations
 
@@ -67,7 +67,8 @@ def test_a_brake_of_some_runs_is_damping_there(tmp_path: Path) -> None:
     assert effect.name == "viscous_damping"
     (viscous,) = effect.parameters
     assert viscous.runs == ("r2.csv", "r3.csv")
-    assert viscous.ci95 is not None and viscous.ci95[0] < 0.058 < viscous.ci95[1]
+    assert viscous.ci95 is not None
+    assert viscous.ci95[0] < 0.058 < viscous.ci95[1]
 
 
 def test_friction_in_a_motors_current_is_named_though_it_is_soft(tmp_path: Path) -> None:
