@@ -23,6 +23,7 @@ def found(*variables, inputs=("SA", "FZ"), unit="N", reason="", line=None):
     return Of(
         problem=problem,
         structure=tuple(Of(variables=(name,), reason=reason, line=line) for name in variables),
+        augmented=Of(simulated={}),
     )
 
 
@@ -234,3 +235,13 @@ def test_a_zero_that_every_run_has_to_one_side_is_to_be_read(zeros, told):
 def test_the_advice_beside_a_name_is_about_what_it_leaves():
     (sentence,) = to_find_it(found("run"), subject="What is left")
     assert sentence.startswith("What is left differs from run to run")
+
+
+def test_a_line_where_the_simulation_swings_by_itself_is_no_other_machines():
+    t = np.arange(600) * 0.1
+    search = found("time", reason="a line", line=line(0.5))
+    search.problem.runs = (Of(t=t, columns={}, rows=len(t)),)
+    search.problem.slices = (slice(0, len(t)),)
+    search.augmented.simulated["FY"] = np.exp(-0.01 * t) * np.cos(2 * np.pi * 0.5 * t)
+    (said,) = to_find_it(search)
+    assert "where the simulated FY swings by itself" in said

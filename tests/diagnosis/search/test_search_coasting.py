@@ -133,7 +133,7 @@ def test_an_effect_stays_where_the_likelihood_falls_without_it_whatever_the_curv
     )
     folds = folds_of(problem, made)
     wide = replace(made, covariance=made.covariance * 1e9)
-    told, _, kept = told_from_none(problem, folds, wide, unseen, steps)
+    told, _, kept = told_from_none(problem, folds, wide, unseen, steps, trust=1.0)
     assert names(kept) == ["periodic_ripple", "quadratic_drag"]
     # Its standard deviation is the one at which a normal likelihood falls as far from the size to none.
     drag = dict(made.active[0].values)["drag"]

@@ -135,7 +135,7 @@ def test_the_mean_of_what_wanders_is_no_step_and_no_name(
     folds = folds_of(problem, bare)
     before, unseen = hold_out(problem, folds, (), bare), hold_out(problem, folds, made.active, made)
     steps = [Step(active=made.active[0], p_value=0.0, held_out_gain=9.0, gain=9.0, rivals=())]
-    told, _, left = told_from_none(problem, folds, made, unseen, steps)
+    told, _, left = told_from_none(problem, folds, made, unseen, steps, trust=1.0)
     assert len(left) == len(told.active) == named
     listed = [each for each in candidates(problem) if each.key == made.active[0].key]
     (scored,) = best_of(LinearisedFit.of(problem, bare).score(listed[0]))
