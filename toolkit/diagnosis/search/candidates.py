@@ -291,7 +291,11 @@ def _middle(parameter: EffectParameter) -> float:
 
 
 def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
-    """Return the sets of runs to which the conditions may confine an effect."""
+    """Return the sets of runs to which the conditions may confine an effect.
+
+    A condition that nobody here knows and that is another number in each of three or more runs (where each
+    starts, its mean temperature) groups none: any one run would have a group of its own.
+    """
     subsets: list[frozenset[str]] = []
     names = {run.name for run in problem.runs}
     for key in effect.confining(key for run in problem.runs for key in run.conditions):
@@ -299,7 +303,8 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
         for run in problem.runs:
             if key in run.conditions:
                 levels.setdefault(run.conditions[key], []).append(run.name)
-        if len(levels) < 2:
+        apart = key not in effect.confined_by and len(levels) == len(problem.runs) > 2
+        if len(levels) < 2 or (apart and all(_is_number(level) for level in levels)):
             continue
         ordered = _in_order(list(levels))
         groups: list[Sequence[str]] = [[level] for level in ordered]
@@ -312,7 +317,12 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
 
 
 def _in_order(levels: list[str]) -> list[str]:
+    return sorted(levels, key=float) if all(_is_number(level) for level in levels) else sorted(levels)
+
+
+def _is_number(level: str) -> bool:
     try:
-        return sorted(levels, key=float)
+        float(level)
     except ValueError:
-        return sorted(levels)
+        return False
+    return True
