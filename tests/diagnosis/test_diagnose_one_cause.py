@@ -53,6 +53,19 @@ def answer(folder: Path, toml: str, simulator: str, frames: dict[str, pd.DataFra
     return diagnose(read_case(write_case(folder, toml, simulator=simulator, **frames)), None).diagnosis
 
 
+def joint() -> dict[str, pd.DataFrame]:
+    """Return a joint swept to and fro: dry friction of 1.3 A that turns within 0.03 rad/s."""
+    frames, t = {}, np.arange(0.0, 20.0, 0.05)
+    for k in range(3):
+        rng = np.random.default_rng(k)
+        first, second = rng.uniform(0.4, 0.9), rng.uniform(1.4, 2.2)
+        w = 0.5 * np.sin(first * t + k) + 0.2 * np.sin(second * t)
+        acc = 0.5 * first * np.cos(first * t + k) + 0.2 * second * np.cos(second * t)
+        current = 0.55 * acc + 2.2 * w - 1.5 * w**3 + 1.3 * np.tanh(w / 0.03) + rng.normal(0, 0.1, t.size)
+        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "w": w, "acc": acc, "current": current})
+    return frames
+
+
 def test_a_brake_of_some_runs_is_damping_there(tmp_path: Path) -> None:
     """A free balance that decays at 0.0058 1/s, and at 0.064 1/s with a magnet beside its vane."""
     t, toml, frames = np.arange(0.0, 40.0, 0.1), BALANCE, {}
@@ -76,18 +89,26 @@ def test_friction_in_a_motors_current_is_named_though_it_is_soft(tmp_path: Path)
         "python", parameters={"J": (0.5, "A*s^2/rad", 0.2), "b": (2.5, "A*s/rad", 1.5)},
         inputs={"w": "rad/s", "acc": "rad/s^2"}, outputs={"current": "A"}, runs=3,
     )  # fmt: skip
-    frames, t = {}, np.arange(0.0, 20.0, 0.05)
-    for k in range(3):
-        rng = np.random.default_rng(k)
-        first, second = rng.uniform(0.4, 0.9), rng.uniform(1.4, 2.2)
-        w = 0.5 * np.sin(first * t + k) + 0.2 * np.sin(second * t)
-        acc = 0.5 * first * np.cos(first * t + k) + 0.2 * second * np.cos(second * t)
-        current = 0.55 * acc + 2.2 * w - 1.5 * w**3 + 1.3 * np.tanh(w / 0.03) + rng.normal(0, 0.1, t.size)
-        frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "w": w, "acc": acc, "current": current})
-    effects = {effect.name: effect for effect in answer(tmp_path, toml, JOINT, frames).effects}
+    effects = {effect.name: effect for effect in answer(tmp_path, toml, JOINT, joint()).effects}
     assert "coulomb_friction" in effects
     coulomb = next(each for each in effects["coulomb_friction"].parameters if each.name == "coulomb")
     assert 1.1 < coulomb.value < 1.5
+
+
+def test_friction_that_the_simulation_has_is_not_missing_for_being_softer(tmp_path: Path) -> None:
+    """The declared friction jumps where the real one turns softly: its form is off, no friction missing."""
+    toml = case_text(
+        "python",
+        parameters={"J": (0.5, "A*s^2/rad", 0.2), "b": (2.5, "A*s/rad", 1.5), "fc": (1.4, "A", 0.4)},
+        inputs={"w": "rad/s", "acc": "rad/s^2"}, outputs={"current": "A"}, runs=3,
+    )  # fmt: skip
+    simulator = JOINT.replace('* inputs["w"]', '* inputs["w"] + p["fc"] * np.tanh(inputs["w"] / 0.005)')
+    effects = answer(
+        tmp_path, toml, simulator.replace("import pandas", "import numpy as np\nimport pandas"), joint()
+    ).effects
+    assert "coulomb_friction" not in {
+        name for effect in effects for name in (effect.name, *effect.equivalent_to)
+    }
 
 
 def test_a_leak_of_the_load_is_named_beside_a_law_in_another_output(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from toolkit.diagnosis.search.in_place import foretold_best
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise, may_leave_noise, weighed_as_mismatch
 from toolkit.diagnosis.search.pairs import best_pair
+from toolkit.diagnosis.search.parameters_alike import without_own_terms
 from toolkit.diagnosis.search.proposals import NONE, proposals
 from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored
@@ -323,6 +324,7 @@ def _searched(
             steps,
             told_from_none(problem, folds, base, held_base, steps, trust=screen.trust(base.noise)),
         )
+        base, held_base, steps = without_own_terms(problem, folds, refitted, base, held_base, steps)
         structure = structure if steps or not named else before
     scatter: tuple[RunScatter, ...] = ()
     if steps:
