@@ -95,22 +95,6 @@ def test_friction_in_a_motors_current_is_named_though_it_is_soft(tmp_path: Path)
     assert 1.1 < coulomb.value < 1.5
 
 
-def test_friction_that_the_simulation_has_is_not_missing_for_being_softer(tmp_path: Path) -> None:
-    """The declared friction jumps where the real one turns softly: its form is off, no friction missing."""
-    toml = case_text(
-        "python",
-        parameters={"J": (0.5, "A*s^2/rad", 0.2), "b": (2.5, "A*s/rad", 1.5), "fc": (1.4, "A", 0.4)},
-        inputs={"w": "rad/s", "acc": "rad/s^2"}, outputs={"current": "A"}, runs=3,
-    )  # fmt: skip
-    simulator = JOINT.replace('* inputs["w"]', '* inputs["w"] + p["fc"] * np.tanh(inputs["w"] / 0.005)')
-    effects = answer(
-        tmp_path, toml, simulator.replace("import pandas", "import numpy as np\nimport pandas"), joint()
-    ).effects
-    assert "coulomb_friction" not in {
-        name for effect in effects for name in (effect.name, *effect.equivalent_to)
-    }
-
-
 def test_a_leak_of_the_load_is_named_beside_a_law_in_another_output(tmp_path: Path) -> None:
     """Weights along one axis at a time: 1 % of z stands in x, 1.8 % in y, and z is bent by x."""
     parameters = {f"k{a}": (1.68, "1/g", 0.05) for a in "xyz"} | {f"z{a}": (100.0, "1", 15.0) for a in "xyz"}
