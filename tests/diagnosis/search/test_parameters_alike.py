@@ -29,15 +29,15 @@ def simulate(inputs, p):
 
 
 @pytest.mark.parametrize(
-    ("declared", "sd", "unit", "stays"),
+    ("off_sd", "unit", "stays"),
     [
-        (1.4, 0.4, "A", False),  # the simulation has it, and its prior believes what it needs
-        (0.2, 0.02, "A", True),  # its prior does not
-        (1.4, 0.4, "N", True),  # it is another thing
+        (-0.5, "A", False),  # the simulation has it, and its prior believes what the refit needs
+        (-3.5, "A", True),  # its prior does not
+        (-0.5, "N", True),  # it is another thing
     ],
 )
 def test_friction_that_the_simulation_has_is_not_missing(
-    tmp_path: Path, declared: float, sd: float, unit: str, stays: bool
+    tmp_path: Path, off_sd: float, unit: str, stays: bool
 ) -> None:
     """Dry friction of 1.3 A that jumps where the simulation's turns softly."""
     t, frames = np.arange(0.0, 20.0, 0.05), {}
@@ -46,7 +46,7 @@ def test_friction_that_the_simulation_has_is_not_missing(
         noise = np.random.default_rng(k).normal(0, 0.05, t.size)
         frames[f"r{k}__csv"] = pd.DataFrame({"t": t, "w": w, "current": 2.2 * w + 1.3 * np.sign(w) + noise})
     toml = case_text(
-        "python", parameters={"b": (2.2, "A*s/rad", 0.05), "fc": (declared, unit, sd)},
+        "python", parameters={"b": (2.2, "A*s/rad", 0.05), "fc": (1.4, unit, 0.4)},
         inputs={"w": "rad/s"}, outputs={"current": "A"}, runs=3,
     )  # fmt: skip
     case = read_case(write_case(tmp_path, toml, simulator=JOINT, **frames))
@@ -58,6 +58,7 @@ def test_friction_that_the_simulation_has_is_not_missing(
     assert made is not None
     folds = folds_of(problem, refitted)
     step = Step(active=made.active[0], p_value=0.0, held_out_gain=1.0, gain=1.0, rivals=())
+    refit = replace(refitted, p=(refitted.p[0], 1.4 + 0.4 * off_sd))
     unseen = hold_out(problem, folds, made.active, made)
-    _, _, left = without_own_terms(problem, folds, refitted, made, unseen, [step])
+    _, _, left = without_own_terms(problem, folds, refit, made, unseen, [step])
     assert bool(left) is stays
