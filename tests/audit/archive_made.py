@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import zipfile
+
 import numpy as np
+import openpyxl
 
 from tests.benchmarks import archive_factory as factory
 
@@ -33,3 +37,23 @@ def write(path, table, headers=HEADER):
 def dated(folder, date, more=""):
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "test.toml").write_text(f'schema = 1\nmachine = "m15"\ndate = {date}\n{more}')
+
+
+def write_saved(path, table, moment):
+    """Write a workbook that says of itself when it was saved."""
+    book = openpyxl.Workbook()
+    book.active.append([HEADER[name] for name in table])
+    for row in np.column_stack(list(table.values())).tolist():
+        book.active.append(row)
+    book.save(path)
+    rewrite(path, moment)  # openpyxl stamps the moment of saving
+
+
+def rewrite(path, moment):
+    with zipfile.ZipFile(path) as source:
+        parts = {name: source.read(name) for name in source.namelist()}
+    core = parts["docProps/core.xml"]
+    parts["docProps/core.xml"] = re.sub(rb"(<dcterms:modified[^>]*>)[^<]*", rb"\g<1>" + moment.encode(), core)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
+        for name, content in parts.items():
+            target.writestr(name, content)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.audit.archive_made import FY, HEADER, dated, recording, write
+from tests.audit.archive_made import FY, HEADER, dated, recording, rewrite, write, write_saved
 from toolkit.audit.archive import audit_archive
 from toolkit.calibration.registry.registry import Registry
 from toolkit.machine import load_machine
@@ -82,18 +82,9 @@ def test_a_test_whose_slip_angle_has_another_sign(tmp_path):
 
 
 def test_a_file_saved_long_after_its_test(tmp_path):
-    from openpyxl import Workbook
-
     dated(tmp_path, "2019-06-01")
     for name, day in (("late", 20), ("next day", 2)):
-        book = Workbook()
-        table = recording()
-        book.active.append([HEADER[name] for name in table])
-        for row in np.column_stack(list(table.values())).tolist():
-            book.active.append(row)
-        book.save(tmp_path / f"{name}.xlsx")
-        # openpyxl stamps the moment of saving
-        rewrite(tmp_path / f"{name}.xlsx", f"2019-06-{day:02d}T10:00:00Z")
+        write_saved(tmp_path / f"{name}.xlsx", recording(), f"2019-06-{day:02d}T10:00:00Z")
     found = rules(audit(tmp_path), "edited-after-test")
     assert list(found) == ["late.xlsx"]
     assert "2019-06-20, 19 days after the test of 2019-06-01" in found["late.xlsx"]
@@ -105,19 +96,6 @@ def test_a_recording_that_the_toolkit_wrote_has_a_day_once_it_is_edited(tmp_path
         write_labview(tmp_path / name, load_machine("m15"), recording(), simulated=True)
     rewrite(tmp_path / "edited.xlsx", "2026-11-22T08:02:39Z")
     assert list(rules(audit(tmp_path), "edited-after-test")) == ["edited.xlsx"]
-
-
-def rewrite(path, moment):
-    import re
-    import zipfile
-
-    with zipfile.ZipFile(path) as source:
-        parts = {name: source.read(name) for name in source.namelist()}
-    core = parts["docProps/core.xml"]
-    parts["docProps/core.xml"] = re.sub(rb"(<dcterms:modified[^>]*>)[^<]*", rb"\g<1>" + moment.encode(), core)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
-        for name, content in parts.items():
-            target.writestr(name, content)
 
 
 @pytest.fixture(scope="module")

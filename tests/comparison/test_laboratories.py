@@ -235,6 +235,8 @@ def test_decimal_commas_and_another_unit_of_u_are_the_same_results(tmp_path) -> 
         ("laboratory,value [N]\n,1\n", "laboratory"),
         ("laboratory,value [N],U [N]\nA,1,-1\n", "-1"),
         ("laboratory,value [N],U [N],k\nA,1,1,0\n", "above 0"),
+        # no measurement is without uncertainty: a 0 is an empty cell's, and zeta and E_n are then too large
+        ("laboratory,value [N],U [N],k\nA,1,0,2\n", "above 0, or an empty cell where none is stated"),
         ("laboratory,value [N],U [N]\nA,1,1\nA,1,2\n", "two uncertainties"),
     ],
 )

@@ -21,6 +21,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from toolkit.audit.day import CONTRADICTED, TwoDays, saved_before
 from toolkit.audit.model import CLEAN, NOT_IDENTIFIED
 from toolkit.audit.sides import disputed
 from toolkit.audit.structure import odd_counts
@@ -264,6 +265,7 @@ class Across:
     _open: dict[str, TestSums] = field(default_factory=dict)
     _slopes: dict[tuple[str, str], list[tuple[str, int]]] = field(default_factory=dict)
     _first: dict[bytes, str] = field(default_factory=dict)
+    _days: TwoDays = field(default_factory=TwoDays)
     _units: dict[str, Counter[tuple[tuple[str, str], ...]]] = field(default_factory=dict)
     _with: dict[tuple[tuple[str, str], ...], list[str]] = field(default_factory=dict)
 
@@ -273,6 +275,7 @@ class Across:
         for note in line["notes"]:
             yield noted(note, path)
         yield from self._copies(line)
+        self._days.add(line)
         if line["units"]:
             units = tuple(sorted(line["units"].items()))
             self._units.setdefault(line["instrument"], Counter())[units] += 1
@@ -286,6 +289,9 @@ class Across:
                     f"the test of {line['date']}"
                 )
                 yield Finding(rule="edited-after-test", where=path, message=message, level="note")
+        early = saved_before(line)
+        if early is not None:
+            yield Finding(rule=CONTRADICTED, where=path, message=early, level="note")
         # Sorted by path, all files of a test's folder come in one stretch.
         for name in [name for name in self._open if name != "." and not path.startswith(name + "/")]:
             yield from self._closed(name)
@@ -304,6 +310,8 @@ class Across:
         """Yield what only the whole archive can say."""
         for name in list(self._open):
             yield from self._closed(name)
+        for path, message in self._days.told.items():
+            yield Finding(rule=CONTRADICTED, where=path, message=message, level="note")
         yield from self._conventions()
         for (instrument, rotation), signs in self._slopes.items():
             majority = 1 if sum(sign for _, sign in signs) >= 0 else -1

@@ -19,6 +19,7 @@ import numpy as np
 
 from toolkit.arrays import Array
 from toolkit.audit.context import Context, context_of
+from toolkit.audit.day import CONTRADICTED, of_two_days
 from toolkit.audit.identify import recompute
 from toolkit.audit.model import CLEAN, INDEX, DisagreeingSides, columns_of
 from toolkit.audit.other_files import off_the_curve, test_of
@@ -112,7 +113,7 @@ def write_copies(
     """
     check_target(audit.archive, target)
     standings: dict[tuple[str, str], Standing] = {}
-    strays = _strays(audit)
+    strays, apart = _strays(audit), of_two_days(audit.files.plain())
     copies: list[CorrectedCopy] = []
     with publication(target) as stage:
         for plain in audit.files.plain():
@@ -130,7 +131,7 @@ def write_copies(
                     known_at=audit.known_at,
                     named=key[0],
                 )
-            why = _refusal(plain, strays)
+            why = _refusal(plain, strays, apart)
             copies.append(_copy(audit.archive, plain, standings[key], stage, draft=draft, refusal=why))
             step(plain["path"])
         manifest = {
@@ -164,10 +165,12 @@ def disagreement(plain: Mapping[str, Any]) -> str:
     return statement(DisagreeingSides(**plain["sides"]), plain["variant"])
 
 
-def _refusal(plain: Mapping[str, Any], strays: Mapping[str, str]) -> str | None:
+def _refusal(plain: Mapping[str, Any], strays: Mapping[str, str], apart: Mapping[str, str]) -> str | None:
     """Return why a file must not be corrected by its cells, None where nothing speaks against it."""
     if disputed(plain):
         return f"{DISPUTED}: {disagreement(plain)}"
+    if plain["path"] in apart:
+        return f"{CONTRADICTED}: {apart[plain['path']]}"
     stray = strays.get(plain["path"])
     return None if stray is None else f"stray-file: corrected, {stray}"
 

@@ -39,7 +39,7 @@ def read_laboratories(path: Path) -> tuple[dict[str, Sequence[Results]], str]:
     ColumnError
         a column is unknown, doubled, missing, without a unit or with another one than the results'
     CellError
-        a cell that is no finite number or empty, a negative U, a k of 0, two statements of one U
+        a cell that is no finite number or empty, a U or k that is not above 0, two statements of one U
     """
     table, separator = read_lines(read_input(path, TABLE_FILE), _is_column, where=path)
     head, lines = (table[0][1] if table else []), table[1:]
@@ -58,8 +58,8 @@ def read_laboratories(path: Path) -> tuple[dict[str, Sequence[Results]], str]:
                 _refuse_cell(path, number, name, "an empty cell", "a name", "cell")
         at = _Place(path=path, row=number, decimal=decimal)
         value = at.number("value", row["value"])
-        U = U_scale * at.number("U", row["U"], 0.0) if row.get("U") else None
-        k = at.number("k", row["k"], 1e-9) if row.get("k") else K
+        U = U_scale * at.number("U", row["U"], positive=True) if row.get("U") else None
+        k = at.number("k", row["k"], positive=True) if row.get("k") else K
         by_laboratory = reported.setdefault(row.get("measurand", ONE), {})
         by_laboratory.setdefault(row["laboratory"], []).append((value, U, k))
     if not reported:
@@ -128,15 +128,15 @@ class _Place:
     row: int
     decimal: str
 
-    def number(self, column: str, text: str, least: float = -math.inf) -> float:
+    def number(self, column: str, text: str, *, positive: bool = False) -> float:
         """Return the number of a cell."""
         value = number_or_text(text, self.decimal)
-        if isinstance(value, str) or not math.isfinite(value) or value < least:
-            at_least = "" if math.isinf(least) else " of 0 or more" if least == 0 else " above 0"
+        if isinstance(value, str) or not math.isfinite(value) or (positive and value <= 0):
+            above = " above 0, or an empty cell where none is stated," if positive else ""
             sign = "comma" if self.decimal == "," else "point"
             _refuse_cell(
                 self.path, self.row, column, repr(text) if text else "an empty cell",
-                f"a finite number{at_least} with a decimal {sign}", "cell",
+                f"a finite number{above} with a decimal {sign}", "cell",
             )  # fmt: skip
         return value
 

@@ -36,6 +36,7 @@ from toolkit.findings import Finding
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.machine import TypeB
 from toolkit.recording.csvfile import Line, pointed, read_lines
+from toolkit.recording.table import shown
 from toolkit.reduction.model import Condition
 from toolkit.reduction.selection import of_one_condition
 from toolkit.spelling import nearest
@@ -199,7 +200,7 @@ def _number(cell: str, factor: float, where: str, *, needed: bool) -> float | No
         value = math.nan
     if not math.isfinite(value):
         raise CellError(
-            "no number", where=where, got=repr(text) if text else "an empty cell",
+            "no number", where=where, got=shown(text) if text else "an empty cell",
             expected="a finite number with a decimal point", next_step="mend that cell",
             rule="text-cell" if text else "empty-cell",
         )  # fmt: skip

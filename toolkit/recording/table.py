@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -19,6 +20,7 @@ from toolkit.recording.columns import Assigned, assign_columns
 from toolkit.recording.model import Series
 
 _NUMBERS = frozenset((float, int))
+_WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _EMPTY = ("", None)
 _HEADER_ROWS = 50  # rows at the top in which a header is looked for
 
@@ -197,10 +199,20 @@ def judge(cell: object) -> tuple[str | None, str]:
             return "nan-cell", "a number beyond double precision"
     if isinstance(cell, str):
         kind = "error-cell" if cell.startswith("#") else "text-cell"
-        return kind, f"{'the text ' if kind == 'text-cell' else ''}{cell[:80]!r}"
+        return kind, f"{'the text ' if kind == 'text-cell' else ''}{shown(cell)}"
     if isinstance(cell, dt.date | dt.time | dt.timedelta):
         return "date-cell", f"a date or time, {cell}"
     return "text-cell", repr(cell)[:80]
+
+
+def shown(text: str) -> str:
+    """Return a text that is no number as it stands; of a number with a comma the sign is told.
+
+    >>> shown("0,375"), shown("n/a")
+    ("'0,375', with a comma where numbers are read with points", "'n/a'")
+    """
+    sign = ", with a comma where numbers are read with points" if _WITH_COMMA.fullmatch(text.strip()) else ""
+    return f"{text[:80]!r}{sign}"
 
 
 def refuse_cell(rule: str, actual: str, where: str, row: int, column: int, header: str) -> NoReturn:

@@ -29,6 +29,7 @@ from toolkit.errors import CellError, ColumnError, UnreadableError, refuse_unkno
 from toolkit.findings import Finding
 from toolkit.inputs import TABLE_FILE, read_input
 from toolkit.recording.csvfile import Line, pointed, read_lines
+from toolkit.recording.table import shown
 from toolkit.tires.plausibility import LARGEST, load_of
 from toolkit.units import split_header, unit
 
@@ -271,7 +272,7 @@ def _numbers(cells: list[str], header: list[str], path: Path, row: int) -> list[
             raise CellError(
                 f"row {row}, column {name.strip()!r}: no number",
                 where=f"{path}, row {row}, column {name.strip()!r}",
-                got=repr(text) if text else "an empty cell",
+                got=shown(text) if text else "an empty cell",
                 expected="a finite number, with the decimal sign of the others",
                 next_step="remove or mend that row",
                 rule="text-cell" if text else "empty-cell",

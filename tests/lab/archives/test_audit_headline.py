@@ -79,6 +79,16 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
             "3 files carry a wrong Fy, up to 5.2 N; cause: E5 negative (2), D51<->D52 (1); in 2014-03",
         ),
         (
+            # of more causes than the sentence has room for, those of the sizes that it states are named
+            [
+                *[file("stale", record=record) for record in ("m15-r1", "m15-r2", "m15-r3", "m15-r4")] * 2,
+                wrong("2014-03-09", 2173.7),
+            ],
+            "9 files carry a wrong Fy, up to 2\N{NARROW NO-BREAK SPACE}174 N; "
+            "cause: computed by m15-r1, which was not in force (2), "
+            "computed by m15-r2, which was not in force (2), E5 negative (1), others (4); in 2014-03",
+        ),
+        (
             [file("stale", repair={"FY_max_abs_N": 0.0, "MZ_max_abs_Nm": 0.125})],
             "1 file carries a wrong Mz, up to 0.12 N·m; cause: computed by m15-r1, which was not in force; "
             "in 2014-03",

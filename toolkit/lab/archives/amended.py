@@ -86,13 +86,27 @@ def amend(
 def _unfit(audited: ArchiveAudit) -> dict[str, ToolkitError]:
     """Return the tests that cannot be computed from their cells, each with its first file that says so."""
     from toolkit.audit.corrected import DISPUTED, disagreement
+    from toolkit.audit.day import CONTRADICTED, of_two_days
     from toolkit.audit.sides import disputed
     from toolkit.errors import RecordingError
 
     unfit: dict[str, ToolkitError] = {}
+    apart = of_two_days(audited.files.plain())
     for plain in audited.files.plain():
         test = plain["test"]
-        if test is None or test in unfit or not disputed(plain):
+        if test is None or test in unfit:
+            continue
+        if plain["path"] in apart:
+            unfit[test] = RecordingError(
+                "the day of the test is contradicted",
+                where=audited.shown(test),
+                got=f"{plain['path']}: {apart[plain['path']]}",
+                expected="recordings of the test alone",
+                next_step="put the file back into its own test, or correct the date, and audit again",
+                rule=CONTRADICTED,
+            )
+            continue
+        if not disputed(plain):
             continue
         unfit[test] = RecordingError(
             "the test cannot be computed again from its cells",

@@ -27,6 +27,7 @@ class CauseCount:
 
     cause: str
     files: int
+    largest: Annotated[bool, Entry(output=False)] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,8 +127,10 @@ class Headline:
     def _cause(self) -> str:
         if len(self.causes) == 1:
             return self.causes[0].cause
-        counted = [f"{count.cause} ({count.files})" for count in self.causes[:_CAUSES]]
-        remaining = sum(count.files for count in self.causes[_CAUSES:])
+        # The size that the sentence states has its cause in it, however few files share that.
+        named = sorted(self.causes, key=lambda count: not count.largest)[:_CAUSES]
+        counted = [f"{count.cause} ({count.files})" for count in self.causes if count in named]
+        remaining = sum(count.files for count in self.causes if count not in named)
         return ", ".join(counted) + (f", others ({remaining})" if remaining else "")
 
     def _since(self) -> str:
@@ -146,6 +149,7 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     count = wrong = unjudged = unreadable = impossible = bare = 0
     small = altered = open_files = no_recording = stepping = copies = 0
     FY = MZ = 0.0
+    largest: dict[str, str] = {}
     causes: Counter[str] = Counter()
     months: set[str] = set()
     for file in files:
@@ -173,12 +177,18 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
             small += 1
         else:
             wrong += 1
-            FY = max(FY, repair["FY_max_abs_N"] or 0.0)
-            MZ = max(MZ, repair["MZ_max_abs_Nm"] or 0.0)
-            causes[_cause_of(file)] += 1
+            cause = _cause_of(file)
+            causes[cause] += 1
+            if (repair["FY_max_abs_N"] or 0.0) > FY:
+                FY, largest["FY"] = repair["FY_max_abs_N"], cause
+            if (repair["MZ_max_abs_Nm"] or 0.0) > MZ:
+                MZ, largest["MZ"] = repair["MZ_max_abs_Nm"], cause
             if file["date"]:
                 months.add(file["date"][:7])
-    counted = tuple(CauseCount(cause=cause, files=of) for cause, of in causes.most_common())
+    counted = tuple(
+        CauseCount(cause=cause, files=of, largest=cause in largest.values())
+        for cause, of in causes.most_common()
+    )
     return Headline(
         files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=counted,
         first=min(months, default=None), last=max(months, default=None), unjudged=unjudged,
