@@ -19,6 +19,7 @@ from toolkit.planning.members import (
     class_of,
     completed,
     denser,
+    evidence_a_second,
     expected_log_evidence,
     members_of,
     predict,
@@ -158,6 +159,29 @@ def test_a_run_in_which_derivatives_say_nothing_of_a_members_parameters_parts_no
         expected = expected_log_evidence(run, (late, late), true, rival)
         assert expected == pytest.approx(max(held - true.lost - rival.lost, 0.0))
     assert held > 3
+
+
+def test_a_run_that_is_made_again_is_its_rows_one_below_the_other() -> None:
+    rng = np.random.default_rng(5)
+    true, rival = (
+        gaussian(rng.normal(size=6), rng.normal(size=(6, count))) for count in (1, 2)
+    )  # fmt: skip
+    thrice: Any = SimpleNamespace(t=np.arange(18.0), rows=18)
+
+    def stacked(predicted: Predicted) -> Predicted:
+        return gaussian(np.tile(predicted.outputs["F"], 3), np.tile(predicted.spread["F"], (3, 1)))
+
+    both = (member(0.7), member(0.9))
+    once = expected_log_evidence(thrice, both, stacked(true), stacked(rival))
+    assert expected_log_evidence(RUN, both, true, rival, times=3) == pytest.approx(once)
+
+
+def test_no_row_tells_more_than_the_one_in_which_two_are_furthest_apart() -> None:
+    none = np.zeros((6, 0))
+    true, rival = gaussian(np.array([0.0, 1, 0, -3, 0, 0]), none), gaussian(np.zeros(6), none)
+    told = evidence_a_second(RUN, (member(1.5), member(2.0)), true, rival)
+    assert told == pytest.approx(0.5 * (3 / 2.0) ** 2)
+    assert 6 * told >= expected_log_evidence(RUN, (member(1.5), member(2.0)), true, rival)
 
 
 def test_a_denser_run_has_its_rows_and_one_between_each_two(tmp_path: Path) -> None:
