@@ -56,7 +56,7 @@ from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
-from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.policy import EVEN, VERDICT
 from toolkit.diagnosis.search.between_rows import differences
 from toolkit.diagnosis.simulators.build_simulator import model_of
 from toolkit.errors import ConfigError, ToolkitError
@@ -249,12 +249,31 @@ def fitted_again(more: Problem, members: tuple[Member, ...]) -> tuple[Member, ..
     return tuple(sorted(again, key=lambda member: -member.fit.log_posterior))
 
 
-def named(more: Problem, members: tuple[Member, ...]) -> str | None:
+def explains(more: Problem, after: Member, before: Member) -> bool:
+    """Tell whether a member explains the last run within the noise that it had in all before.
+
+    It may be louder by as much as sensors differ by from run to run, in no output by more.
+    """
+    last = more.slices[-1]
+    return all(
+        float(np.mean(residual[last][more.kept[name][last]] ** 2))
+        <= EVEN.runs * before.fit.noise[name].marginal_sd ** 2
+        for name, residual in after.fit.residual.items()
+    )
+
+
+def named(more: Problem, members: tuple[Member, ...], before: tuple[Member, ...] | None = None) -> str | None:
     """Return the effect of the member that is ahead of all others by what a diagnosis asks for.
 
-    Also whatever is assumed between the rows, where both read a simulation there.
+    Also whatever is assumed between the rows, where both read a simulation there. And where the member ahead
+    does not explain the last run, by its fit to those ``before``, nothing is named: of fits that both end
+    in some other minimum one is ahead by chance.
     """
     first, *others = members
+    if before is not None:
+        known = next(member for member in before if member.label == first.label)
+        if not explains(more, first, known):
+            return None
     *beside, chosen = first.fit.active
     behind = {
         other.label: other.fit.active[-1]
@@ -337,7 +356,7 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
         assert run is not None
         more = with_run(drawn, run, change.run, folder / label, rng)
         try:
-            names[label] = named(more, fitted_again(more, members))
+            names[label] = named(more, fitted_again(more, members), members)
         except ToolkitError:
             names[label] = None
     return Outcome(

@@ -22,6 +22,7 @@ from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.noise import layout, whiten
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.search.candidates import CandidateEffect, candidates
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError, FitError
@@ -342,7 +343,8 @@ def expected_log_evidence(
     are less apart. What rows leave open by either is open to both. But a fit of the run takes simulations at
     their rows for the truth: by what inputs that go straight between rows make of it, it is misled. And what
     the true member's own fit may miss is not to be expected, nor what the other one's may find: where
-    derivatives do not say what its parameters change, it may come nearer than they say.
+    derivatives do not say what its parameters change, it may come nearer than they say. Where that is as much
+    as a verdict asks for, which one is ahead is chance, however far apart they are: nothing is expected.
 
     Parameters
     ----------
@@ -351,7 +353,8 @@ def expected_log_evidence(
         the other
     """
     expected = min(_divergence(run, member, true, rival, times) for member in members)
-    return max(expected - times * (true.lost + rival.lost), min(expected, 0.0))
+    lost = times * (true.lost + rival.lost)
+    return min(expected, 0.0 if lost > VERDICT.close else max(expected - lost, 0.0))
 
 
 def _divergence(run: Run, member: Member, true: Predicted, rival: Predicted, times: float) -> float:

@@ -162,8 +162,13 @@ def _needed(search: RunSearch, chosen: NextRun) -> str:
 
     seconds = float(chosen.run.t[-1] - chosen.run.t[0])
     often = search.repeated(chosen)
+    why = (
+        "by their own predictions the members' fits of it may end elsewhere"
+        if any(predicted.lost for predicted in chosen.predicted)
+        else "each member's parameters follow the other"
+    )
     said = (
-        "made again and again it parts no pair, as each member's parameters follow the other"
+        f"made again and again it parts no pair, as {why}"
         if often is None
         else f"it would take {_long(often[0] * seconds)} of it ({often[0]} times as many rows; "
         f"power {100 * often[1]:.0f} %)"
