@@ -9,9 +9,10 @@ limits and a repeat. The generator's truth answers each, later than all recordin
 then the members are fitted to all recordings, each from where it was. Named is the one that is ahead of all
 others by what a diagnosis asks for. The newest batch comes first.
 
-`--drawn` takes no batch: cases with a delay or a lag are drawn anew by the proof's generator, in turn of its
-families (`FAMILIES`). One counts where the generator itself finds others within its noise of the effect
-(`alike`), and is twice as far from none, and where the recordings name none.
+`--drawn` takes no batch: cases are drawn anew by the proof's generator, family and effect by its own
+weights, with one effect or of a class by construction, as often as a batch has them. One counts where the
+generator itself knows the class, or finds others within its noise of the effect (`alike`) that is twice as
+far from none, and where the recordings name none.
 
 Runs are planned within limits as a laboratory would know them of its machine.
 They were fixed before any outcome by them was seen, with these reasons:
@@ -22,6 +23,7 @@ They were fixed before any outcome by them was seen, with these reasons:
 - a chamber or a bath (`T`, `TA`) is set within 15 K of the middle of what was recorded, three times as fast;
 - rows are recorded up to sixteen times as dense: what is kept of a converter's thousand samples a second is
   a choice of the file;
+- a run takes up to eight times as long as a recording: minutes, where recordings are of some ten seconds;
 - the drum's speed stays as recorded: the shafts' angles, which are recorded beside it, go with it.
 
 Left out, and counted: classes that no run of such a plan can ask about (`outside`).
@@ -45,7 +47,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from proof import catalogue, draw, process_noise, proof_file
+from proof import draw, process_noise, proof_file
 from proof import model as generated
 from proof.files import write_case
 from tests.coverage.rows import exact_interval
@@ -54,22 +56,21 @@ from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.case.reader import read_case
 from toolkit.diagnosis.fit.fit import fit
 from toolkit.diagnosis.fit.problem import Problem, problem_of
-from toolkit.diagnosis.policy import VERDICT
+from toolkit.diagnosis.policy import EVEN, VERDICT
 from toolkit.diagnosis.search.between_rows import differences
 from toolkit.diagnosis.simulators.build_simulator import model_of
-from toolkit.errors import ToolkitError
+from toolkit.errors import ConfigError, ToolkitError
 from toolkit.planning.drives import fastest
-from toolkit.planning.members import Member, members_of, row_step
+from toolkit.planning.members import Member, members_of, refined, row_step
 from toolkit.planning.next_run import RunSearch
-from toolkit.planning.run_changes import Change, RunLimits, changed, movable, reach
+from toolkit.planning.run_changes import Change, RunLimits, changed, lengthened, movable, reach
 
 PROOFS = Path(__file__).parents[2] / "proof"
 KINDS = ("proposed", "random", "repeat")
 SEARCH_S = 30.0  # of the processor
 PROMISED = 0.9  # power
-SPAN, PACE, CHAMBER_K, DENSE = 1.5, 3.0, 15.0, 16
-FAMILIES = ("pendulum", "drive", "drive-force", "tank", "thermal", "tire-machine", "tire-python")
-SHORT = ("channel_delay", "filter_lag")
+SPAN, PACE, CHAMBER_K, DENSE, LONG = 1.5, 3.0, 15.0, 16, 8
+BUCKETS = ("single", "confounded")
 SHOWN = 2  # times as far from no effect at all as others may be from it: else the recordings show none
 CHAMBERS, WITH_SHAFTS = ("T", "TA"), ("V",)
 
@@ -125,24 +126,29 @@ class SealedClass:
 
 
 def drawn_classes(seed: int) -> Iterator[SealedClass]:
-    """Yield classes of what is shorter than it shows, drawn anew, without end."""
+    """Yield classes drawn anew, without end."""
+    share = np.array([draw.MIX[bucket] for bucket in BUCKETS])
     for index in itertools.count():
-        family = FAMILIES[index % len(FAMILIES)]
-        name = SHORT[index // len(FAMILIES) % len(SHORT)]
-        if name not in catalogue.FAMILIES[family].inside:
-            continue
+        bucket = str(np.random.default_rng([seed, index, 99]).choice(BUCKETS, p=share / share.sum()))
         try:
-            again = draw.draw_case(seed, index, "single", picked=(family, (name,)))
+            again = draw.draw_case(seed, index, bucket)
         except RuntimeError:  # no draw met its conditions
             continue
-        (effect,) = again.answer["effects"]
-        if again.answer["alike"] and effect["distance"] > SHOWN * draw.ALIKE:
+        sealed = again.answer
+        (effect,) = sealed["effects"]
+        others = sorted({*(sealed["class"] or sealed["alike"])} - {effect["name"]})
+        clear = sealed["class"] or effect["distance"] > SHOWN * draw.ALIKE
+        if (
+            others
+            and clear
+            and not outside(sealed | {"effects": [{"name": n} for n in others], "bucket": ""})
+        ):
             effect = {
-                "name": name, "channel": effect["channel"], "parameters": (),
-                "equivalent_to": tuple(sorted(again.answer["alike"])),
+                "name": effect["name"], "channel": effect["channel"], "parameters": (),
+                "equivalent_to": tuple(others),
             }  # fmt: skip
             yield SealedClass(
-                batch=f"seed {seed}", seed=seed, name=f"case {index}", sealed=again.answer,
+                batch=f"seed {seed}", seed=seed, name=f"case {index}", sealed=sealed,
                 answer={"effects": [effect]}, new=again,
             )  # fmt: skip
 
@@ -186,10 +192,13 @@ def carried_out(
     base = next(known for known in s.runs if known.name == name)
     # As many steps between denser rows as between those of the generator's own runs.
     denser = round(float(base.rows[1] - base.rows[0]) / float(run.t[1] - run.t[0]))
-    places = np.arange((len(base.fine["t"]) - 1) * denser + 1) / denser
-    fine = {key: np.interp(places, np.arange(len(y)), y) for key, y in base.fine.items()}
+    longer = float(run.t[-1] - run.t[0]) / float(base.rows[-1] - base.rows[0])
+    own = Run(
+        name=name, t=base.fine["t"], columns=base.fine, conditions={}, declared={}, simulated={}
+    )  # fmt: skip
+    fine = dict(lengthened(refined(own, denser), longer).columns)
     if "push" in fine:  # what pushes a plant comes no second time
-        fine["push"] = np.std(fine["push"]) * process_noise._push(base, rng)
+        fine["push"] = np.std(fine["push"]) * process_noise._push(dataclasses.replace(base, fine=fine), rng)
     later = float(run.t[0] - base.rows[0])  # as the plan has it: after all that was recorded
     for channel, declared in s.channels.items():
         if declared.role in ("input", "covariate") and channel in fine and channel in run.columns:
@@ -240,12 +249,31 @@ def fitted_again(more: Problem, members: tuple[Member, ...]) -> tuple[Member, ..
     return tuple(sorted(again, key=lambda member: -member.fit.log_posterior))
 
 
-def named(more: Problem, members: tuple[Member, ...]) -> str | None:
+def explains(more: Problem, after: Member, before: Member) -> bool:
+    """Tell whether a member explains the last run within the noise that it had in all before.
+
+    It may be louder by as much as sensors differ by from run to run, in no output by more.
+    """
+    last = more.slices[-1]
+    return all(
+        float(np.mean(residual[last][more.kept[name][last]] ** 2))
+        <= EVEN.runs * before.fit.noise[name].marginal_sd ** 2
+        for name, residual in after.fit.residual.items()
+    )
+
+
+def named(more: Problem, members: tuple[Member, ...], before: tuple[Member, ...] | None = None) -> str | None:
     """Return the effect of the member that is ahead of all others by what a diagnosis asks for.
 
-    Also whatever is assumed between the rows, where both read a simulation there.
+    Also whatever is assumed between the rows, where both read a simulation there. And where the member ahead
+    does not explain the last run, by its fit to those ``before``, nothing is named: of fits that both end
+    in some other minimum one is ahead by chance.
     """
     first, *others = members
+    if before is not None:
+        known = next(member for member in before if member.label == first.label)
+        if not explains(more, first, known):
+            return None
     *beside, chosen = first.fit.active
     behind = {
         other.label: other.fit.active[-1]
@@ -262,7 +290,11 @@ def named(more: Problem, members: tuple[Member, ...]) -> str | None:
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """A class, what the plan said of it, and what was named after each kind of run."""
+    """A class, what the plan said of it, and what was named after each kind of run.
+
+    ``length`` of the run, in that of the recording; ``needed`` how often it would have to be made to part a
+    pair; ``most`` the log-evidence of the longest run, were every row as far apart as the farthest.
+    """
 
     case: str
     members: tuple[str, ...]
@@ -272,6 +304,9 @@ class Outcome:
     named: dict[str, str | None]
     steps: str
     seconds: float
+    length: float
+    needed: int | None
+    most: float
 
     @property
     def parts(self) -> bool:
@@ -294,7 +329,12 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
     write_case(drawn.scenario, drawn.measured, folder / "before")
     posed = problem(folder / "before" / "CASE.toml")
     began = time.process_time()
-    members = members_of(posed, left.effects, found)
+    try:
+        members = members_of(posed, left.effects, found)
+    except ConfigError:
+        return "fewer than two of the class are candidates of a diagnosis"
+    if all(member.fit.active[-1].effect.name != true[0] for member in members):
+        return "the true effect is no candidate of a diagnosis"
     if left.new is not None and named(posed, members) is not None:
         return "the recordings name one"
     ends = time.process_time() + SEARCH_S
@@ -307,6 +347,7 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
     took = time.process_time() - began
     if chosen is None:
         return "no run can be simulated"
+    again = None if chosen.parts else search.repeated(chosen)
     names: dict[str, str | None] = {}
     for label, change in zip(
         KINDS, (best, random_change(search, rng), Change(run=best.run)), strict=True
@@ -315,14 +356,15 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
         assert run is not None
         more = with_run(drawn, run, change.run, folder / label, rng)
         try:
-            names[label] = named(more, fitted_again(more, members))
+            names[label] = named(more, fitted_again(more, members), members)
         except ToolkitError:
             names[label] = None
     return Outcome(
         case=f"{left.batch} {left.name} {left.sealed['bucket']} {left.sealed['family']}",
         members=tuple(member.fit.active[-1].effect.name for member in members), true=true[0],
         power=chosen.power, together=chosen.together, named=names, steps="; ".join(best.words()),
-        seconds=took,
+        seconds=took, length=best.length, needed=again[0] if again else None,
+        most=search.farthest * limits.longest_s,
     )  # fmt: skip
 
 
@@ -343,7 +385,8 @@ def laboratory_limits(posed: Problem) -> RunLimits:
             runs = [run for run in posed.case.runs if name in run.columns]
             rates[name] = PACE * max(fastest(run.t, run.columns[name]) for run in runs)
     step_s = min(row_step(run) for run in posed.runs) / DENSE
-    return RunLimits(values=values, rates=rates, step_s=step_s)
+    longest_s = LONG * max(float(run.t[-1] - run.t[0]) for run in posed.runs)
+    return RunLimits(values=values, rates=rates, step_s=step_s, longest_s=longest_s)
 
 
 def outcomes(listed: Iterable[SealedClass], minutes: float, seed: int) -> Iterator[Outcome | str]:
@@ -397,6 +440,9 @@ def main() -> None:
     sure = [row for row in rows if row.power > PROMISED]
     answered = [row for row in rows if row.parts]
     sys.stdout.write(f"{table(rows)}\nwhere the command proposes a run:\n{table(answered)}\n")
+    refused = [row for row in rows if not row.parts]
+    impossible = sum(row.most <= VERDICT.close for row in refused)
+    sys.stdout.write(f"refused: {len(refused)}, of which no run of the longest time parts {impossible}\n")
     sys.stdout.write(f"promised over {PROMISED:g}:\n{table(sure)}\n")
     sys.stdout.write(f"not counted: {dict(uncounted)}\n")
 

@@ -205,6 +205,7 @@ def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
         (["--rate", "w=1"], "of u"),
         (["--limit", "u=-1..1", "--limit", "u=-2..2"], "each input once"),
         (["--sample-rate", "20"], "50 Hz at least"),
+        (["--minutes", "0.1"], "0.1663 min at least"),
     ],
 )
 def test_a_limit_that_cannot_be_read(run, diagnosed, arguments, part):
@@ -218,7 +219,26 @@ def test_limits_within_which_nothing_parts_are_refused_with_what_would(run, diag
     error = failed.exception
     assert (error.rule, error.exit_code) == ("plan-infeasible", 2)
     assert "channel_delay" in str(error.next_step)
+    # How long it would have to be, as it is, and at least.
+    assert "times as many rows" in str(error.expected)
+    assert "by no course less than" in str(error.expected)
     assert not (tmp_path / "n").exists()
+
+
+def test_a_run_may_be_as_long_as_the_case_or_an_option_says(run, tmp_path):
+    stated = 'longest_run = { value = 1, unit = "min" }\n'
+    slow = ("--rate", "u=0.3", "--json")
+    short = run("plan", "next", left_open(tmp_path / "a"), *slow)
+    assert (short.exception.rule, short.exception.exit_code) == ("plan-infeasible", 2)
+    by_case = run("plan", "next", left_open(tmp_path / "b", recording=stated), *slow)
+    by_option = run("plan", "next", left_open(tmp_path / "c"), *slow, "--minutes", "1", "--out", "n")
+    for planned in (by_case, by_option):
+        assert planned.return_value == 0, planned
+        said = json.loads(planned.stdout)
+        assert 11 < said["seconds"] <= 60.1
+        assert "times as long" in " ".join(said["steps"])
+    rows = (tmp_path / "n" / "next.csv").read_text().splitlines()[1:]
+    assert float(rows[-1].split(",")[0]) == pytest.approx(said["seconds"], abs=0.1)
 
 
 def test_what_is_shorter_than_a_row_is_refused_with_the_rate_that_parts_it_and_planned_at_it(run, tmp_path):

@@ -81,7 +81,12 @@ def test_a_reliability_that_no_interval_keeps_names_the_nearest_that_one_does(tm
     assert not (tmp_path / "out").exists()
     nearest = re.search(r"--reliability ([^\s,]+)", str(refused.value.next_step))
     assert nearest is not None
-    assert run(home, "--reliability", nearest[1])[1]["days"] >= 30
+    code, answer = run(home, "--reliability", nearest[1])
+    assert answer["days"] >= 30
+    # Years after the last session the day of the next one is past, which nothing but the plan says.
+    assert code == 1
+    assert [finding["rule"] for finding in answer["findings"]] == ["overdue"]
+    assert answer["next"] in answer["findings"][0]["message"]
 
 
 def test_what_cannot_be_planned_is_an_error(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from tests.planning.class_factory import DELAY, answer, found, problem, write_case
 from toolkit.diagnosis.fit.noise import Autoregression
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.errors import ConfigError
 from toolkit.planning.members import (
     Member,
@@ -19,6 +20,7 @@ from toolkit.planning.members import (
     class_of,
     completed,
     denser,
+    evidence_a_second,
     expected_log_evidence,
     members_of,
     predict,
@@ -155,9 +157,46 @@ def test_a_run_in_which_derivatives_say_nothing_of_a_members_parameters_parts_no
             run, (late, late), *(followed if p is whole else p for p in (true, rival))
         )
         # Neither what the true member's own fit may miss is expected, nor what the rival's may find.
-        expected = expected_log_evidence(run, (late, late), true, rival)
-        assert expected == pytest.approx(max(held - true.lost - rival.lost, 0.0))
-    assert held > 3
+        assert held > 3
+        assert expected_log_evidence(run, (late, late), true, rival) == 0
+
+
+def test_of_a_run_whose_fits_may_end_anywhere_nothing_is_expected() -> None:
+    """A pendulum over the top: 3.5 million apart, of which fits may miss 0.8 million: not 2.7 million."""
+    none, both = np.zeros((6, 0)), (member(1.0), member(1.0))
+    apart = np.full(6, np.sqrt(2 * 3.5e6 / 6))
+    for missed, expected in ((0.8e6, 0.0), (VERDICT.close + 0.1, 0.0), (2.0, 3.5e6 - 2.0)):
+        near, far = gaussian(np.zeros(6), none), gaussian(apart, none)
+        for true, rival in (
+            (near, dataclasses.replace(far, lost=missed)), (dataclasses.replace(near, lost=missed), far),
+        ):  # fmt: skip
+            assert expected_log_evidence(RUN, both, true, rival) == pytest.approx(expected)
+    # Of rows that are made again as much again is missed.
+    twice = expected_log_evidence(RUN, both, near, dataclasses.replace(far, lost=2.0), times=2)
+    assert twice == 0
+
+
+def test_a_run_that_is_made_again_is_its_rows_one_below_the_other() -> None:
+    rng = np.random.default_rng(5)
+    true, rival = (
+        gaussian(rng.normal(size=6), rng.normal(size=(6, count))) for count in (1, 2)
+    )  # fmt: skip
+    thrice: Any = SimpleNamespace(t=np.arange(18.0), rows=18)
+
+    def stacked(predicted: Predicted) -> Predicted:
+        return gaussian(np.tile(predicted.outputs["F"], 3), np.tile(predicted.spread["F"], (3, 1)))
+
+    both = (member(0.7), member(0.9))
+    once = expected_log_evidence(thrice, both, stacked(true), stacked(rival))
+    assert expected_log_evidence(RUN, both, true, rival, times=3) == pytest.approx(once)
+
+
+def test_no_row_tells_more_than_the_one_in_which_two_are_furthest_apart() -> None:
+    none = np.zeros((6, 0))
+    true, rival = gaussian(np.array([0.0, 1, 0, -3, 0, 0]), none), gaussian(np.zeros(6), none)
+    told = evidence_a_second(RUN, (member(1.5), member(2.0)), true, rival)
+    assert told == pytest.approx(0.5 * (3 / 2.0) ** 2)
+    assert 6 * told >= expected_log_evidence(RUN, (member(1.5), member(2.0)), true, rival)
 
 
 def test_a_denser_run_has_its_rows_and_one_between_each_two(tmp_path: Path) -> None:

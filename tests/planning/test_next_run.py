@@ -6,10 +6,12 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.planning.class_factory import T, found, problem, with_run, write_case
 from tests.planning.test_run_changes import steady_slide
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.planning import next_run
 from toolkit.planning.drives import Drive, fastest
 from toolkit.planning.members import members_of
@@ -65,6 +67,50 @@ def test_what_is_shorter_than_a_row_is_parted_by_denser_rows(tmp_path: Path) -> 
     first, second = members_of(more, (EFFECT,), EFFECT)
     assert first.label == "channel_delay on F"
     assert first.fit.log_posterior - second.fit.log_posterior > 3
+
+
+def test_a_run_that_is_too_short_is_as_long_as_is_said_to_be_needed(tmp_path: Path) -> None:
+    """So slow that late and lagging hardly differ: what one run does not part some of it do, made as one.
+
+    And no row differs by more than the responses to a ramp do, whose difference is the integral of that of
+    the steps: of a delay d and a lag g it is at most d - g (1 - e) + g e with e = exp(-d / g), for each unit
+    of the rate, beside the difference of both gains.
+    """
+    posed = problem(write_case(tmp_path, delay=0.02))
+    members = members_of(posed, (EFFECT,), EFFECT)
+    recorded = max(fastest(run.t, run.columns["u"]) for run in posed.runs)
+    limits = RunLimits(rates={"u": 0.06 * recorded})
+    search = RunSearch(problem=posed, members=members, limits=limits)
+    short = search.judge(search.best())
+    assert short is not None
+    assert not short.parts
+    needed = search.repeated(short)
+    assert needed is not None
+    times, power = needed
+    assert 1 < times < 16
+    assert power > short.power
+
+    longer = anew(search, limits=dataclasses.replace(limits, longest_s=2.0 * times * float(np.ptp(T))))
+    chosen = longer.judge(longer.best())
+    assert chosen is not None
+    assert chosen.parts
+    assert 1 < chosen.change.length <= 2 * times
+    assert np.ptp(chosen.run.t) == pytest.approx(chosen.change.length * np.ptp(T), rel=1e-2)
+    assert fastest(chosen.run.t, chosen.run.columns["u"]) <= 0.06 * recorded * (1 + 1e-9)
+    assert "times as long" in " ".join(chosen.change.words())
+
+    delay, lag = (
+        next(iter(m.fit.active[-1].values.values())) for m in sorted(members, key=lambda member: member.label)
+    )
+    gains = sorted(float(member.fit.p[0]) for member in members)
+    tried = [run for run in search.runs.values() if run in search.judged]
+    rate = max(float(np.max(np.abs(np.diff(run.columns["u"]) / np.diff(run.t)))) for run in tried)
+    reach = max(float(np.max(np.abs(run.columns["u"]))) for run in tried)
+    later = float(np.exp(-delay / lag))
+    apart = gains[1] * rate * (delay - lag * (1 - later) + lag * later) + (gains[1] - gains[0]) * reach
+    sd = max(member.fit.noise["F"].sd for member in members)
+    assert search.farthest * 0.02 <= 0.5 * (apart / sd) ** 2 * (1 + 1e-6)
+    assert VERDICT.close / search.farthest < times * np.ptp(T)  # the least time is less than one that does
 
 
 def test_the_power_is_that_of_the_nearest_of_the_others() -> None:
@@ -143,7 +189,7 @@ def test_of_runs_that_part_with_certainty_the_nearest_to_the_recording_counts(
 ) -> None:
     # Evidence grows with the pace, all of it beyond certainty: the most of it is at the fastest.
     monkeypatch.setattr(
-        next_run, "expected_log_evidence", lambda run, *_: 1e3 * fastest(T, run.columns["u"]) ** 4
+        next_run, "expected_log_evidence", lambda run, *_, **_times: 1e3 * fastest(T, run.columns["u"]) ** 4
     )
     certain = RunSearch(problem=search.problem, members=search.members, limits=RunLimits())
     assert certain.best() == Change(run="r0.csv")

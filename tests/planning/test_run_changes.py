@@ -11,7 +11,7 @@ import pytest
 from tests.planning.class_factory import T, problem, write_case
 from toolkit.diagnosis.fit.problem import Problem
 from toolkit.planning.drives import Drive, fastest
-from toolkit.planning.run_changes import Change, RunLimits, changed, movable, nearest_limits, reach
+from toolkit.planning.run_changes import Change, RunLimits, changed, lengths, movable, nearest_limits, reach
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,38 @@ def test_a_change_of_nothing_is_a_repeat(late: Problem) -> None:
     assert run is not None
     np.testing.assert_allclose(run.columns["u"], late.runs[1].columns["u"], atol=1e-12)
     np.testing.assert_array_equal(run.t, late.runs[1].t)  # each run has a clock of its own here
+
+
+def test_a_longer_run_goes_back_and_forth_and_what_only_grows_goes_on(tmp_path: Path) -> None:
+    case = write_case(tmp_path)
+    for path in tmp_path.glob("r*.csv"):
+        run = pd.read_csv(path)
+        run.assign(angle=run["t"] + 0.01 * run["t"] ** 2).to_csv(path, index=False)
+    channels = 'angle = { unit = "rad", role = "covariate" }\n[[rec'
+    case.write_text(case.read_text(encoding="utf-8").replace("[[rec", channels, 1), encoding="utf-8")
+    posed = problem(case)
+    run = changed(posed, Change(run="r0.csv", length=2.5), RunLimits())
+    assert run is not None
+    recorded = posed.runs[0].columns
+    np.testing.assert_allclose(np.diff(run.t), 0.02, rtol=1e-9)
+    assert run.rows == round(2.5 * 499) + 1
+    np.testing.assert_array_equal(run.columns["t"], run.t)
+    np.testing.assert_allclose(run.columns["u"][499:999], recorded["u"][::-1], atol=1e-9)
+    np.testing.assert_allclose(run.columns["u"][998:], recorded["u"][:251], atol=1e-9)
+    assert (np.diff(run.columns["angle"]) > 0).all()
+    # The angle's rate is that of the shaft, which goes back to what it was.
+    rate = np.diff(run.columns["angle"])
+    np.testing.assert_allclose(rate[499:998], rate[:499][::-1], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("longest", "rows", "most"), [(0.0, 1, 1.0), (25.0, 1, 2.505), (1e6, 1, 16.0), (1e6, 16, 4.0)]
+)
+def test_lengths_are_doublings_and_the_longest(late: Problem, longest: float, rows: int, most: float) -> None:
+    found = lengths(late.runs[0], rows, RunLimits(longest_s=longest))
+    assert found[0] == 1.0
+    assert found[-1] == pytest.approx(most, rel=1e-3)
+    assert list(found) == sorted(found)
 
 
 def test_faster_inputs_come_again_there_and_back(late: Problem) -> None:

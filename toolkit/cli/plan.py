@@ -250,6 +250,11 @@ def following(
         "Rows that can be recorded in a second; default: the case's, the machine's, or as recorded.",
         Mark(metavar="HZ", min=0.0),
     ] = None,
+    minutes: Annotated[
+        float | None,
+        "How long a run may take; default: the case's longest_run, or as recorded.",
+        Mark(metavar="MIN", min=0.0),
+    ] = None,
     budget: Annotated[
         float, "Seconds until the search ends; a third of them it has in any case.", Mark(min=1.0)
     ] = 45.0,
@@ -266,8 +271,8 @@ def following(
 
     Each member is fitted to the recordings in the others' place. Runs are those that were made, with inputs
     faster or slower, larger or smaller, one alone, on new courses within the limits, with denser rows where
-    these can be recorded, and conditions changed: the one is proposed in which the members' predictions are
-    furthest apart beyond noise and what is open of their parameters.
+    these can be recorded, longer where one may be, and conditions changed: the one is proposed in which the
+    members' predictions are furthest apart beyond noise and what is open of their parameters.
 
     Example: toolkit plan next answer --out next
     """
@@ -278,7 +283,7 @@ def following(
     with output.progress("planning") as step:
         planned, text = plan_next(
             source, out, case=case, limits=tuple(limit or ()), rates=tuple(rate or ()),
-            sample_rate_Hz=sample_rate, budget_s=budget, calibrations=place.calibrations, home=place.home,
-            worker=worker.limits(), template=opened, tell=step,
+            sample_rate_Hz=sample_rate, minutes=minutes, budget_s=budget, calibrations=place.calibrations,
+            home=place.home, worker=worker.limits(), template=opened, tell=step,
         )  # fmt: skip
     return answered(planned, text, output)

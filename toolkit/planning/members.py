@@ -22,6 +22,7 @@ from toolkit.diagnosis.case.case import Run
 from toolkit.diagnosis.fit.fit import Fit, fit
 from toolkit.diagnosis.fit.noise import layout, whiten
 from toolkit.diagnosis.fit.problem import Problem
+from toolkit.diagnosis.policy import VERDICT
 from toolkit.diagnosis.search.candidates import CandidateEffect, candidates
 from toolkit.effects.applied import AppliedEffect
 from toolkit.errors import ConfigError, FitError
@@ -321,7 +322,20 @@ def _moved(problem: Problem, fitted: Fit, step: Array) -> tuple[dict[str, float]
     return values, active
 
 
-def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, rival: Predicted) -> float:
+def evidence_a_second(run: Run, members: Sequence[Member], true: Predicted, rival: Predicted) -> float:
+    """Return the log-evidence a second that the row tells in which two members are furthest apart.
+
+    Nothing has to be fitted beside, and no row tells more: no run whose rows are no further apart than this
+    one gathers more in its time.
+    """
+    gap = {name: true.outputs[name] - column for name, column in rival.outputs.items()}
+    rows = (np.sum(member.white(run, gap).reshape(len(gap), -1) ** 2, axis=0) for member in members)
+    return min(float(0.5 * row.max()) for row in rows) / row_step(run)
+
+
+def expected_log_evidence(
+    run: Run, members: Sequence[Member], true: Predicted, rival: Predicted, *, times: float = 1.0
+) -> float:
     """Return the mean log-evidence of a true member over another one, in a run that is yet to be made.
 
     The divergence of two Gaussians with covariances I + W W^T in the noise's standard deviations (Woodbury's
@@ -329,22 +343,27 @@ def expected_log_evidence(run: Run, members: Sequence[Member], true: Predicted, 
     are less apart. What rows leave open by either is open to both. But a fit of the run takes simulations at
     their rows for the truth: by what inputs that go straight between rows make of it, it is misled. And what
     the true member's own fit may miss is not to be expected, nor what the other one's may find: where
-    derivatives do not say what its parameters change, it may come nearer than they say.
+    derivatives do not say what its parameters change, it may come nearer than they say. Where that is as much
+    as a verdict asks for, which one is ahead is chance, however far apart they are: nothing is expected.
 
     Parameters
     ----------
     members : those of the two predictions
+    times : how often the run is made, one after the other: rows with the same expectation stand one below
+        the other
     """
-    expected = min(_divergence(run, member, true, rival) for member in members)
-    return max(expected - true.lost - rival.lost, min(expected, 0.0))
+    expected = min(_divergence(run, member, true, rival, times) for member in members)
+    lost = times * (true.lost + rival.lost)
+    return min(expected, 0.0 if lost > VERDICT.close else max(expected - lost, 0.0))
 
 
-def _divergence(run: Run, member: Member, true: Predicted, rival: Predicted) -> float:
-    gap = member.white(run, {name: true.outputs[name] - column for name, column in rival.outputs.items()})
-    open_to_both = [member.white(run, predicted.between) for predicted in (true, rival)]
-    own, rivals = (
-        np.hstack([member.white(run, predicted.spread), *open_to_both]) for predicted in (true, rival)
-    )
+def _divergence(run: Run, member: Member, true: Predicted, rival: Predicted, times: float) -> float:
+    def white(columns: Mapping[str, Array]) -> Array:
+        return member.white(run, columns) * math.sqrt(times)
+
+    gap = white({name: true.outputs[name] - column for name, column in rival.outputs.items()})
+    open_to_both = [white(predicted.between) for predicted in (true, rival)]
+    own, rivals = (np.hstack([white(predicted.spread), *open_to_both]) for predicted in (true, rival))
     inner, of_own = (np.eye(w.shape[1]) + w.T @ w for w in (rivals, own))
     through, crossed = rivals.T @ gap, rivals.T @ own
     squares = float(gap @ gap - through @ np.linalg.solve(inner, through))
@@ -352,7 +371,7 @@ def _divergence(run: Run, member: Member, true: Predicted, rival: Predicted) -> 
     trace -= float(np.sum(crossed * np.linalg.solve(inner, crossed)))
     logs = float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(of_own)[1])
     expected = 0.5 * (squares + trace + logs)
-    spread = member.white(run, rival.spread)
+    spread = white(rival.spread)
     apart = gap - spread @ np.linalg.solve(np.eye(spread.shape[1]) + spread.T @ spread, spread.T @ gap)
     misled = max((abs(float(apart @ w[:, 0])) for w in open_to_both if w.shape[1]), default=0.0) / _BETWEEN
     return min(expected, 0.5 * float(gap @ apart) - misled) if misled else expected

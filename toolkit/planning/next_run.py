@@ -25,6 +25,7 @@ from toolkit.planning.members import (
     Predicted,
     completed,
     denser,
+    evidence_a_second,
     expected_log_evidence,
     predict,
 )
@@ -36,6 +37,7 @@ from toolkit.planning.run_changes import (
     changed,
     conditions,
     densities,
+    lengths,
     movable,
 )
 
@@ -46,6 +48,7 @@ _STEPS = (2, 3, 5, 9)  # levels of a course
 _ROWS = 3  # of a recording, for a move of a course
 _ROUNDS = 2
 _CERTAIN = 2 * VERDICT.close
+_MOST_TIMES = 2.0**24  # as often nobody makes a run
 _ENOUGH = (1 - 1e-6) * _CERTAIN  # what lacks less is certain, and as good as any other
 
 
@@ -69,12 +72,18 @@ class NextRun:
         apart = {(true, rival): gain for true, rival, gain in self.pairs}
         return tuple((a, b) for a, b in apart if a < b and min(apart[a, b], apart[b, a]) <= VERDICT.close)
 
+    @property
+    def parts(self) -> bool:
+        """Tell whether it parts any pair."""
+        return 2 * len(self.together) < len(self.pairs)
+
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class RunSearch:
     """The search of one class.
 
-    ``until`` is asked whether there is time left; ``learn`` is told runs before they are simulated.
+    ``until`` is asked whether there is time left; ``learn`` is told runs before they are simulated;
+    ``farthest`` is the most log-evidence a second that any row of any run tells, whatever is fitted.
     """
 
     problem: Problem
@@ -85,6 +94,7 @@ class RunSearch:
     judged: dict[Run, float] = field(default_factory=dict)
     runs: dict[Change, Run | None] = field(default_factory=dict)
     dense: dict[Run, tuple[Run, Run]] = field(default_factory=dict)
+    farthest: float = 0.0
     _alike: dict[Any, Run] = field(default_factory=dict)
 
     def best(self) -> Change:
@@ -176,10 +186,14 @@ class RunSearch:
             for member, predicted in zip(self.members, predictions, strict=True)
         )
 
-    def _pairs(self, run: Run, predictions: Sequence[Predicted]) -> tuple[tuple[str, str, float], ...]:
+    def _pairs(
+        self, run: Run, predictions: Sequence[Predicted], times: float = 1.0
+    ) -> tuple[tuple[str, str, float], ...]:
         named = list(zip(self.members, predictions, strict=True))
+        for (a, true), (b, rival) in itertools.combinations(named, 2):
+            self.farthest = max(self.farthest, evidence_a_second(run, (a, b), true, rival))
         return tuple(
-            (a.label, b.label, expected_log_evidence(run, (a, b), true, rival))
+            (a.label, b.label, expected_log_evidence(run, (a, b), true, rival, times=times))
             for a, true in named
             for b, rival in named
             if a is not b
@@ -195,10 +209,10 @@ class RunSearch:
         dense = {name: densities(run, self.limits) for name, run in recorded.items()}
         factors = [
             tuple(
-                dataclasses.replace(change, run=name, rows=min(change.rows, dense[name][-1]))
+                self._resized(dataclasses.replace(change, run=name, rows=min(change.rows, dense[name][-1])))
                 for name in recorded
             ),
-            tuple(dataclasses.replace(change, rows=times) for times in dense[change.run]),
+            tuple(self._resized(dataclasses.replace(change, rows=times)) for times in dense[change.run]),
         ]
         for key, values in conditions(self.problem).items():
             rest = tuple(entry for entry in change.conditions if entry[0] != key)
@@ -229,13 +243,22 @@ class RunSearch:
             flat = tuple(entry for entry in change.levels if entry[0] != name)
             moved = (dataclasses.replace(change, levels=(*flat, (name, level))) for level in _LEVELS)
             factors.append((dataclasses.replace(change, levels=flat), *moved))
+        # The last of all: what parts in less time is tried before.
+        possible = lengths(recorded[change.run], change.rows, self.limits)
+        factors.append(tuple(_as_long(change, times) for times in possible))
         return factors
+
+    def _resized(self, change: Change) -> Change:
+        """Return a change of another recording or other rows, no longer than these may be."""
+        run = next(run for run in self.problem.runs if run.name == change.run)
+        return _as_long(change, min(change.length, lengths(run, change.rows, self.limits)[-1]))
 
     def _courses(self, change: Change, name: str) -> list[tuple[Change, ...]]:
         """Return two factors of an input: how often its course goes up and down, and over which levels."""
         others = tuple(entry for entry in change.drives if entry[0] != name)
-        present = dict(change.drives).get(name, Drive(cycles=_CYCLES[0]))
-        rows = change.rows * next(run.rows for run in self.problem.runs if run.name == change.run)
+        present = dict(change.drives).get(name, Drive(cycles=_CYCLES[0] * change.length))
+        rows = change.rows * change.length
+        rows *= next(run.rows for run in self.problem.runs if run.name == change.run)
 
         def with_course(**more: Any) -> tuple[Change, ...]:
             course = dataclasses.replace(present, **more)
@@ -243,7 +266,11 @@ class RunSearch:
                 return ()
             return (dataclasses.replace(change, drives=(*others, (name, course))),)
 
-        paces = [with_course(cycles=cycles, swept=swept) for swept in (False, True) for cycles in _CYCLES]
+        paces = [
+            with_course(cycles=cycles * change.length, swept=swept)
+            for swept in (False, True)
+            for cycles in _CYCLES
+        ]
         shapes = [with_course(levels=levels, rests=rests) for rests in (True, False) for levels in _STEPS]
         recorded = dataclasses.replace(change, drives=others)
         return [
@@ -263,6 +290,38 @@ class RunSearch:
             return None
         pairs = self._pairs(run, predictions)
         return NextRun(change=change, run=run, pairs=pairs, predicted=predictions, power=power_of(pairs))
+
+    def repeated(self, chosen: NextRun) -> tuple[int, float] | None:
+        """Return how often a run has to be made until it parts a pair, and the power then.
+
+        None where so many times are not enough that nobody makes them.
+        """
+
+        def parted(times: float) -> NextRun:
+            pairs = self._pairs(chosen.run, chosen.predicted, times)
+            return dataclasses.replace(chosen, pairs=pairs, power=power_of(pairs))
+
+        low, high = 1.0, 2.0
+        while not (found := parted(high)).parts:
+            low, high = high, 2 * high
+            if high > _MOST_TIMES:
+                return None
+        while round(high) - round(low) > 1:
+            middle = round((low + high) / 2)
+            if (tried := parted(middle)).parts:
+                high, found = middle, tried
+            else:
+                low = middle
+        return round(high), found.power
+
+
+def _as_long(change: Change, times: float) -> Change:
+    """Return a change so many times as long as the recording, its courses going on as they went."""
+    more = times / change.length
+    drives = tuple(
+        (name, dataclasses.replace(drive, cycles=drive.cycles * more)) for name, drive in change.drives
+    )
+    return change if more == 1 else dataclasses.replace(change, length=times, drives=drives)
 
 
 def _all_known(predictions: Iterable[Predicted | None]) -> tuple[Predicted, ...] | None:

@@ -41,6 +41,7 @@ class NextRunPlan:
 ASSUMPTIONS = (
     "the true cause is a member of the class, with parameters near those fitted",
     "the noise of the run is that of the recordings; where rows are denser, its density over time stays",
+    "of a longer run noise and parameters are those of the recordings from its first row to its last",
     "inputs stay within what was recorded, or the limits that were given",
     "they change at most four times as fast as recorded, or at the rates that were given",
     "covariates without a limit are as in the recording that is changed",

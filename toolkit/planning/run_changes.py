@@ -5,7 +5,7 @@ them alone moves, a new course of an input (`drives`), a condition such as the w
 tire stands on its hub. Inputs stay within what was recorded, or within limits that are given. A channel that
 is another one's rate of change stays that. A covariate is measured and not set: it goes on as it was
 recorded, unless a limit is given, which says that it can be set. Rows may be denser than recorded where it is
-said how dense the data acquisition can record them.
+said how dense the data acquisition can record them, and a run longer where it is said how long one may be.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ RATES = (0.25, 0.5, 1.0, 2.0, 4.0)
 """How many times as fast as recorded a run may be."""
 _OF_A_RECORDING = ("phase", "date", "order", "repeat_of", "file")  # and of no other run
 _IS_RATE = 0.98  # of the variance of a channel that another one's derivative explains
-_DOUBLINGS = 4  # of the rows: each takes twice as long to simulate
+_DOUBLINGS = 4  # of the rows, and of the time: each takes twice as long to simulate
+_MOST_ROWS = 64  # for each row of a recording, by both
 _SLACK = 1e-9
 _BETWEEN_ROWS = 0.01  # of an input's span, by which a straight line from row to row may miss its course
 # What else can be done with a tire on a drum, beside the conditions that the recordings have.
@@ -46,13 +47,15 @@ _TURNS = {"mounting": ("normal", "turned"), "rotation": ("forward", "reverse")}
 class RunLimits:
     """What the machine allows, by channel in its unit: ``values`` (low, high), ``rates`` a second.
 
-    ``step_s`` is the least time from row to row [s] that the data acquisition can record. What is not stated
-    is as recorded: the span of values, up to four times the rate, and the rows.
+    ``step_s`` is the least time from row to row [s] that the data acquisition can record, ``longest_s`` the
+    longest that a run may take. What is not stated is as recorded: the span of values, up to four times the
+    rate, the rows and their time.
     """
 
     values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rates: Mapping[str, float] = field(default_factory=dict)
     step_s: float = math.inf
+    longest_s: float = 0.0
 
     def __bool__(self) -> bool:
         """Tell whether anything is stated that a recording may not keep."""
@@ -66,11 +69,13 @@ class Change:
     ``rate`` of the inputs, ``sizes`` of each about its middle, ``mirrored`` those whose sign is turned, rates
     of change with them, ``levels`` of those that are moved to an end of their limits, ``drives`` those that
     have a course of their own between their limits, ``conditions`` that differ. ``rows`` are recorded for
-    each row of the recording.
+    each row of the recording; the run is ``length`` times as long: inputs that have no course of their own
+    then go back and forth.
     """
 
     run: str
     rows: int = 1
+    length: float = 1.0
     rate: float = 1.0
     sizes: tuple[tuple[str, float], ...] = ()
     mirrored: tuple[str, ...] = ()
@@ -83,6 +88,8 @@ class Change:
         statements = [f"drive the inputs of {self.run}"]
         if self.rate != 1.0:
             statements.append(f"{self.rate:g} times as fast")
+        if self.length != 1.0:
+            statements.append(f"{self.length:.4g} times as long, back and forth")
         at_rest = {name for name, size in self.sizes if size == 0}
         statements += [f"{name} {drive.words()}" for name, drive in self.drives if name not in at_rest]
         for name, size in self.sizes:
@@ -151,9 +158,10 @@ def _source(run: Run, name: str, names: Sequence[str]) -> str | None:
 
 def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
     """Return the recording as changed; None where an input leaves what it may reach, or is too fast."""
-    run = refined(next(run for run in problem.runs if run.name == change.run), change.rows)
-    # Faster inputs come again within the same time, there and back.
-    span = run.t[-1] - run.t[0]
+    recording = refined(next(run for run in problem.runs if run.name == change.run), change.rows)
+    run = lengthened(recording, change.length)
+    # Faster inputs, and those of a longer run, come again, there and back.
+    span = recording.t[-1] - recording.t[0]
     phase = np.mod((run.t - run.t[0]) * change.rate / span, 2.0) if span > 0 else np.zeros(run.rows)
     back = phase > 1.0
     at = run.t[0] + span * np.where(back, 2.0 - phase, phase)
@@ -162,9 +170,9 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
     sources = dict(movable(problem, limits))
     for name, depth in sorted(_depths(sources).items(), key=lambda entry: entry[1]):
         column, source, root = run.columns[name], sources[name], _root(name, sources)
-        recorded = reach(problem, name)
-        low, high = limits.values.get(name, recorded)
-        if recorded[1] < low or recorded[0] > high:
+        known = reach(problem, name)
+        low, high = limits.values.get(name, known)
+        if known[1] < low or known[0] > high:
             return None  # the members are known nowhere there
         if root in drives:
             if source is None:
@@ -177,9 +185,10 @@ def changed(problem: Problem, change: Change, limits: RunLimits) -> Run | None:
             else:
                 column = _gain(run, source, name) * np.gradient(columns[source], run.t)
         else:
+            column = recording.columns[name]
             middle = 0.0 if depth else float(np.median(column))
             turn = np.where(back, -1.0, 1.0) ** depth * change.rate**depth
-            column = middle + sizes.get(root, 1.0) * (np.interp(at, run.t, column) * turn - middle)
+            column = middle + sizes.get(root, 1.0) * (np.interp(at, recording.t, column) * turn - middle)
             if root in change.mirrored:
                 column = -column
             if name in levels:
@@ -208,6 +217,40 @@ def densities(run: Run, limits: RunLimits) -> tuple[int, ...]:
         for power in range(_DOUBLINGS + 1)
         if power == 0 or row_step(run) >= 2**power * limits.step_s * (1 - _SLACK)
     )
+
+
+def lengths(run: Run, rows: int, limits: RunLimits) -> tuple[float, ...]:
+    """Return how many times as long as a recording a run may be: 1, 2, 4 and so on, and as long as may be.
+
+    ``rows`` for each of the recording leave fewer doublings.
+    """
+    span = float(run.t[-1] - run.t[0])
+    most = min(limits.longest_s / span if span > 0 else 1.0, 2.0**_DOUBLINGS, _MOST_ROWS / rows)
+    doubled = [2.0**power for power in range(_DOUBLINGS + 1) if 2.0**power <= max(most, 1.0) * (1 + _SLACK)]
+    return (*doubled, most) if most > doubled[-1] * (1 + _SLACK) else tuple(doubled)
+
+
+def lengthened(run: Run, times: float) -> Run:
+    """Return a run so many times as long: its rows back and forth, and on where a channel only grows.
+
+    So does the time, and so does the angle of a shaft: the recording is turned round about its end.
+    """
+    if times == 1.0 or run.rows < 2:
+        return run
+    last = run.rows - 1
+    rounds, place = np.divmod(np.arange(round(last * times) + 1), last)
+    place = np.where(rounds % 2 == 1, last - place, place)
+
+    def on(column: Array) -> Array:
+        if _goes_back(column):
+            return np.asarray(column[place])
+        begun = rounds + rounds % 2  # of a way back: twice its end less what was
+        sign = np.where(rounds % 2 == 1, -1.0, 1.0)
+        start, step = column[0], column[-1] - column[0]
+        return np.asarray(start + begun * step + sign * (column[place] - start))
+
+    columns = {name: on(column) for name, column in run.columns.items()}
+    return dataclasses.replace(run, t=on(run.t), columns=columns)
 
 
 def _depths(sources: Mapping[str, str | None]) -> dict[str, int]:

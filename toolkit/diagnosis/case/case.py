@@ -92,7 +92,7 @@ class Case:
     ``model`` is that file; ``nominal_load_N`` the load to which their parameters are counted, None for that
     of the recordings; ``simulated`` says that these are no recordings of a real machine; ``has_order``
     that their rows follow each other, and are no set of readings; ``sample_rate_Hz`` the highest at which
-    they can be recorded, None where nothing is said of it.
+    they can be recorded, ``longest_run_s`` how long one may take [s], None where nothing is said of it.
     """
 
     path: Path
@@ -110,6 +110,7 @@ class Case:
     model: Path | None = None
     simulated: bool = False
     sample_rate_Hz: float | None = None
+    longest_run_s: float | None = None
     has_order: bool = True
 
     @property

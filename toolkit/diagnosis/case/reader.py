@@ -99,6 +99,7 @@ def read_case(path: Path, *, model: Path | None = None) -> Case:
         model=model_path,
         simulated=recording.simulated,
         sample_rate_Hz=recording.sample_rate_Hz,
+        longest_run_s=recording.longest_run_s,
     )
 
 
@@ -184,6 +185,11 @@ class Recording:
         float | None, Unit("Hz"), Above(0),
         Entry("highest that can be recorded: plans may ask for rows as dense", key="sample_rate",
               example={"value": 200, "unit": "Hz"}),
+    ] = None  # fmt: skip
+    longest_run_s: Annotated[
+        float | None, Unit("s"), Above(0),
+        Entry("longest that a run may take: plans may ask for one as long", key="longest_run",
+              example={"value": 10, "unit": "min"}),
     ] = None  # fmt: skip
     channels: Annotated[
         tuple[CaseChannel, ...], Keyed(by="name"),

@@ -40,7 +40,7 @@ _OPTIONS: Mapping[PlanKind, Mapping[str, str]] = {
         "rise": "--rise",
         "between_files": "--between-files",
     },
-    "next": {"budget": "--budget"},
+    "next": {"sample_rate": "--sample-rate", "minutes": "--minutes", "budget": "--budget"},
     "interval": {"reliability": "--reliability", "tests": "--tests"},
 }
 _SWITCHES: Mapping[PlanKind, Mapping[str, str]] = {
@@ -49,7 +49,7 @@ _SWITCHES: Mapping[PlanKind, Mapping[str, str]] = {
 _REPEATED: Mapping[PlanKind, Mapping[str, str]] = {
     "session": {"u": "--u"},
     "test": {"u": "--u", "load": "--load", "spread": "--spread"},
-    "next": {"limit": "--limit"},
+    "next": {"limit": "--limit", "rate": "--rate"},
     "interval": {},
 }
 

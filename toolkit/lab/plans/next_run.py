@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 import os
 import re
 import shlex
@@ -16,22 +15,28 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from toolkit.declared import Entry
 from toolkit.declared.answers import extended
-from toolkit.errors import ConfigError
 from toolkit.findings import FindingEntry
 from toolkit.lab.answers import document_text
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
+from toolkit.lab.plans.run_demands import (
+    denser_rows,
+    infeasible,
+    least_step,
+    longest_run,
+    nothing_parts,
+    stated_limits,
+    wrong,
+)
 from toolkit.listing import table
 from toolkit.planning.next_run_plan import ASSUMPTIONS, NextRunPlan, PartedPair
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
-    from toolkit.diagnosis.answer.answer import DiagnosedEffect
     from toolkit.diagnosis.case.case import Case, Run
     from toolkit.diagnosis.fit.problem import Problem
     from toolkit.diagnosis.simulators.simulator import Output
     from toolkit.planning.members import Member
-    from toolkit.planning.next_run import NextRun, RunSearch
-    from toolkit.planning.run_changes import RunLimits
+    from toolkit.planning.next_run import NextRun
     from toolkit.report.content import Plot
     from toolkit.report.word.package import Template
     from toolkit.worker.posix import Limits
@@ -49,7 +54,6 @@ class PlanNextAnswer(NextRunPlan):
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
-_SLACK = 1e-3  # of a rate: times of rows are printed
 _PLAIN, _APART = re.compile(r"[A-Za-z0-9_]{1,40}"), "_apart"
 
 
@@ -61,6 +65,7 @@ def plan_next(
     limits: Sequence[str] = (),
     rates: Sequence[str] = (),
     sample_rate_Hz: float | None = None,
+    minutes: float | None = None,
     budget_s: float = 60.0,
     calibrations: Path | None = None,
     home: Path | None = None,
@@ -75,6 +80,7 @@ def plan_next(
     source : folder of ``toolkit diagnose --out``, or its diagnosis.json
     case : the case file; by default the one that the answer's model names
     limits, rates : ``NAME=LOW..HIGH`` in the channel's unit, ``NAME=MOST`` in that a second
+    sample_rate_Hz, minutes : rows that can be recorded in a second, and how long a run may be
     budget_s : seconds until the search over runs ends, a third of which it has in any case
     worker : limits of the case's own code; None runs it in this process
     template : of the sheet that stands in ``out`` beside the other files; None for none
@@ -104,7 +110,7 @@ def plan_next(
     effect = class_of(diagnosis, file)
     read = stated or read_case(_case_of(file))
     if read.sha256 != diagnosis.case_sha256:
-        raise _wrong(
+        raise wrong(
             "the case is not the one of the answer", read.path, read.sha256[:16],
             diagnosis.case_sha256[:16], "diagnose the case again, or name the right one with --case",
         )  # fmt: skip
@@ -113,8 +119,10 @@ def plan_next(
         if code is not None:
             code.until = time.monotonic() + 10 * budget_s
         problem = problem_of(read, model_of(read, registry, code))
-        reach = _limits(limits, rates, read)
-        reach = dataclasses.replace(reach, step_s=_least_step(sample_rate_Hz, problem))
+        reach = dataclasses.replace(
+            stated_limits(limits, rates, read),
+            step_s=least_step(sample_rate_Hz, problem), longest_s=longest_run(minutes, problem),
+        )  # fmt: skip
         tell("the members of the class")
         members = members_of(problem, diagnosis.effects, effect)
         tell("runs")
@@ -126,19 +134,19 @@ def plan_next(
         best = search.best()
         chosen = search.judge(best)
         if chosen is None and reach:
-            raise _infeasible(problem, reach)
+            raise infeasible(problem, reach)
         # A repeat was made once: limits of the next run are none of it.
         recorded = dataclasses.replace(search, limits=RunLimits(), judged={}, runs={}) if reach else search
         repeat = recorded.judge(Change(run=best.run))
-        stays = chosen is not None and len(chosen.together) * 2 == len(chosen.pairs)
+        stays = chosen is not None and not chosen.parts
         complete = time.monotonic() < ends
         longer = time.monotonic() + budget_s / 3
-        denser = _denser(search, lambda: time.monotonic() < longer) if stays else None
+        denser = denser_rows(search, lambda: time.monotonic() < longer) if stays else None
     if chosen is None or repeat is None:
-        raise _wrong("no run can be simulated", read.path, best.run, "a run of the case",
+        raise wrong("no run can be simulated", read.path, best.run, "a run of the case",
                      "look at the case's simulation")  # fmt: skip
     if stays:
-        raise _nothing_parts(chosen, effect, denser, complete=complete)
+        raise nothing_parts(search, chosen, effect, denser, complete=complete)
     driven = [name for name, _ in movable(problem, reach)]
     plan = _plan(read, diagnosis.effects, members, chosen, repeat, driven, len(search.judged), complete)
     answer = extended(PlanNextAnswer, plan, out=out)
@@ -168,86 +176,11 @@ def _case_of(file: Path) -> Path:
     model = file.parent / "model.toml"
     named = read_toml(model).get("answer", {}).get("case") if model.is_file() else None
     if not isinstance(named, str):
-        raise _wrong(
+        raise wrong(
             "the answer does not say where its case is", model, "no case",
             "the model.toml beside diagnosis.json", "name the case with --case CASE.toml",
         )  # fmt: skip
     return Path(os.path.normpath(file.parent / named))
-
-
-def _limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> RunLimits:
-    from toolkit.planning.run_changes import RunLimits
-
-    names = {channel.name: channel.unit for channel in case.drivers}
-    named = ", ".join(f"{name} [{unit}]" for name, unit in names.items())
-    for option, texts in (("--limit", spans), ("--rate", rates)):
-        stated = [text.partition("=")[0].strip() for text in texts]
-        if twice := sorted({name for name in stated if stated.count(name) > 1}):
-            raise _wrong("a limit is stated twice", option, ", ".join(twice), "each input once",
-                         "leave all but one out")  # fmt: skip
-
-    def read(text: str, option: str, form: str, count: int) -> tuple[str, tuple[float, ...]]:
-        name, _, numbers = text.partition("=")
-        try:
-            ends = tuple(float(number) for number in numbers.split(".."))
-        except ValueError:
-            ends = ()
-        rising = len(ends) == count and all(map(math.isfinite, ends)) and (ends[0] < ends[-1] or count == 1)
-        if name.strip() not in names or not rising or (count == 1 and ends[0] <= 0):
-            example = f"{case.drivers[0].name}={'-10..10' if count > 1 else '5'}"
-            raise _wrong(
-                "a limit cannot be read", option, text, f"{form} of {named}, numbers alone",
-                f"write for example {example}",
-            )  # fmt: skip
-        return name.strip(), ends
-
-    values = dict(read(text, "--limit", "NAME=LOW..HIGH, the lower one first,", 2) for text in spans)
-    fastest = dict(read(text, "--rate", "NAME=MOST, above 0,", 1) for text in rates)
-    return RunLimits(
-        values={name: (low, high) for name, (low, high) in values.items()},
-        rates={name: most for name, (most,) in fastest.items()},
-    )
-
-
-def _least_step(sample_rate_Hz: float | None, problem: Problem) -> float:
-    """Return the least time from row to row [s] that can be recorded: as it was, where nothing is said of it.
-
-    Raises
-    ------
-    ConfigError
-        ``plan-next``: the case has no time, or its recordings are denser
-    """
-    from toolkit.machine import load_machine
-    from toolkit.planning.members import row_step
-
-    case = problem.case
-    stated = case.sample_rate_Hz if sample_rate_Hz is None else sample_rate_Hz
-    where = str(case.path) if sample_rate_Hz is None else "--sample-rate"
-    recorded = 1 / min(row_step(run) for run in problem.runs) if case.has_time else math.inf
-    if stated is None:
-        machine = load_machine(case.simulation.machine) if case.simulation.kind == "machine" else None
-        return 1 / ((machine and machine.sample_rate_Hz) or recorded)
-    if not stated >= recorded * (1 - _SLACK):
-        raise _wrong(
-            "rows cannot be recorded so seldom", where, f"sample rate {stated:g} Hz",
-            f"{recorded:.6g} Hz at least, as recorded" if case.has_time else "a case with a time",
-            "leave the sample rate out, or state what can be recorded",
-        )  # fmt: skip
-    return 1 / stated
-
-
-def _denser(search: RunSearch, until: Callable[[], bool]) -> tuple[float, NextRun] | None:
-    """Return the rate of rows [Hz] beyond what is stated at which a run would part a pair, and that run."""
-    from toolkit.planning.members import row_step
-
-    if not search.problem.case.has_time:
-        return None
-    limits = dataclasses.replace(search.limits, step_s=0.0)
-    wider = dataclasses.replace(search, limits=limits, judged={}, runs={}, dense={}, until=until)
-    chosen = wider.judge(wider.best())
-    if chosen is None or len(chosen.together) * 2 == len(chosen.pairs):
-        return None
-    return 1 / row_step(chosen.run), chosen
 
 
 def _plan(
@@ -427,60 +360,3 @@ def plan_text(plan: NextRunPlan, files: Sequence[str], *, model: Path, out: Path
 
 def _simulated(conditions: Mapping[str, str]) -> dict[str, str]:
     return {key: value for key, value in conditions.items() if key != "file"}
-
-
-def _nothing_parts(
-    chosen: NextRun, effect: DiagnosedEffect, denser: tuple[float, NextRun] | None, *, complete: bool
-) -> ConfigError:
-    """Return the error of a class that no run within the limits parts, with what would."""
-    from toolkit.diagnosis.answer.next_measurements import apart
-    from toolkit.diagnosis.policy import VERDICT
-
-    most = max(0.0, *(gain for _, _, gain in chosen.pairs))
-    steps = [] if complete else ["search longer with --budget"]
-    steps.append("allow more")
-    nearest = "; ".join(chosen.change.words())
-    if denser is not None:
-        rate, parting = math.ceil(denser[0] * (1 - 1e-6)), denser[1]
-        nearest = (
-            f"{'; '.join(parting.change.words())}, which names the true one in {100 * parting.power:.0f} %"
-        )
-        steps.append(f"--sample-rate {rate} where rows can be recorded so densely")
-    return ConfigError(
-        "no run within the limits parts the class", where="--limit, --rate",
-        got=f"{' and '.join((effect.name, *effect.equivalent_to))}: expected log-evidence {most:.2g}",
-        expected=f"more than {VERDICT.close:g}; nearest: {nearest}",
-        next_step=f"{', '.join(steps)}, or measure by itself: {apart(effect)}",
-        rule="plan-infeasible",
-    )  # fmt: skip
-
-
-def _infeasible(problem: Problem, limits: RunLimits) -> ConfigError:
-    """Return the error of limits that no change of a recording keeps, with the nearest."""
-    from toolkit.planning.run_changes import nearest_limits
-
-    run, nearest = nearest_limits(problem, limits)
-
-    # Rounded outward: the recording itself lies on the limit.
-    def stated(of: RunLimits, ends: Callable[[float, float], str]) -> str:
-        spans = [f"--limit {name}={ends(*span)}" for name, span in of.values.items()]
-        return " ".join(spans + [f"--rate {name}={ends(0.0, most)[3:]}" for name, most in of.rates.items()])
-
-    return ConfigError(
-        "no run stays within the limits", where="--limit, --rate",
-        got=stated(limits, lambda low, high: f"{low:g}..{high:g}"),
-        expected=f"nearest: what was recorded in {run}",
-        next_step=f"ask with {stated(nearest, _ends)}; nothing was written",
-        rule="plan-infeasible",
-    )  # fmt: skip
-
-
-def _ends(low: float, high: float) -> str:
-    step = 10.0 ** (math.floor(math.log10(high - low)) - 3)
-    return f"{math.floor(low / step) * step:.6g}..{math.ceil(high / step) * step:.6g}"
-
-
-def _wrong(problem: str, where: object, actual: object, expected: str, next_step: str) -> ConfigError:
-    return ConfigError(
-        problem, where=where, got=actual, expected=expected, next_step=next_step, rule="plan-next"
-    )

@@ -79,10 +79,11 @@ def interval_plan_answer(
     plan = plan_interval(paths_of(chart, dates), reliability=reliability, tests_a_year=tests_a_year)
     if not plan.days:
         raise _infeasible(plan)
-    findings = _findings(plan, instrument)
+    day = due.session_date + dt.timedelta(days=plan.days)
+    findings = _findings(plan, instrument, day, registry.today())
     answer = extended(
         PlanIntervalAnswer, plan, instrument=instrument, record=due.record, in_use=due.recall,
-        next=(due.session_date + dt.timedelta(days=plan.days)).isoformat(),
+        next=day.isoformat(),
         method_2_days=due.recommended.days, assumptions=ASSUMPTIONS,
         findings=tuple(finding.as_dict() for finding in findings),
     )  # fmt: skip
@@ -103,15 +104,19 @@ def _infeasible(plan: IntervalPlan) -> ConfigError:
     )  # fmt: skip
 
 
-def _findings(plan: IntervalPlan, instrument: str) -> list[Finding]:
+def _findings(plan: IntervalPlan, instrument: str, day: dt.date, today: dt.date) -> list[Finding]:
     from toolkit.planning.interval import STEP
 
+    findings = []
+    if day < today:
+        message = f"by this interval {instrument} was due on {day.isoformat()}, {(today - day).days} days ago"
+        findings.append(Finding(rule="overdue", where=instrument, message=message))
     if plan.capped:
         message = (
             f"kept at {STEP:g} times the longest gap of {plan.seen_days} days: beyond it nothing was seen"
         )
-        return [Finding(rule="plan-interval", where=instrument, message=message, level="note")]
-    return []
+        findings.append(Finding(rule="plan-interval", where=instrument, message=message, level="note"))
+    return findings
 
 
 def _text(plan: PlanIntervalAnswer, findings: list[Finding]) -> str:
@@ -121,7 +126,7 @@ def _text(plan: PlanIntervalAnswer, findings: list[Finding]) -> str:
         f"{plan.instrument}: {plan.days} days, next by {plan.next}",
         f"at its end inside the tolerance with {100 * (1 - plan.chosen.beyond):.1f} %; asked for: "
         f"{100 * plan.reliability:g} %; in use: {plan.in_use or 'none'}; ILAC-G24 method 2: "
-        f"{plan.method_2_days or '-'} days",
+        f"{'none' if plan.method_2_days is None else f'{plan.method_2_days} days'}",
         f"{plan.limiting} drifts most, by {plan.readings} readings ({plan.paths} check loads and loads): "
         f"{plan.trend_per_year:+.2g} tolerances a year, random walk {plan.walk_per_root_year:.2g} in a year",
         "",
