@@ -475,9 +475,7 @@ class _Verdict:
     of_a_run: float = _set(
         0.5, "of the longest run", "a later channel has fewer rows to show it than it loses"
     )
-    own: float = _set(
-        0.9, "of what an effect does", "a parameter of its dimension does it: it is not missing"
-    )
+    own: float = _set(0.9, "of what an effect does", "a parameter of its unit does: it is not missing")
     observable: float = _set(1e-3, "of a response", "beside the nominal parameters, or nothing is seen of it")
 
 

@@ -11,22 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.fit.fit import Fit, fit, jacobian, log_prior
-from toolkit.diagnosis.fit.folds import hold_out
-from toolkit.diagnosis.fit.noise import whiten
+from toolkit.diagnosis.fit.fit import Fit, fit, log_prior
 from toolkit.diagnosis.policy import LAWS, PRIORS, VERDICT
 from toolkit.diagnosis.search.forward_step import ParameterInPlace
+from toolkit.diagnosis.search.own_terms import shared_responses
 from toolkit.diagnosis.search.superfluous import without
 from toolkit.diagnosis.search.time_budget import BudgetSpentError
-from toolkit.diagnosis.simulators.parameter_units import unit_of
-from toolkit.diagnosis.simulators.setting import dimension
 from toolkit.errors import FitError
 
 if TYPE_CHECKING:
-    from toolkit.arrays import Array
-    from toolkit.diagnosis.fit.folds import Folds, HeldOut
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.search.forward_step import Step
     from toolkit.diagnosis.search.search import Search
     from toolkit.effects.applied import AppliedEffect
 
@@ -41,36 +35,6 @@ def with_parameters_alike(search: Search) -> Search:
             found = None
         steps.append(replace(step, parameter=found))
     return replace(search, steps=tuple(steps))
-
-
-def without_own_terms(
-    problem: Problem, folds: Folds, refitted: Fit, base: Fit, held_base: HeldOut, steps: list[Step]
-) -> tuple[Fit, HeldOut, list[Step]]:
-    """Return a hypothesis without effects that the simulation has, whose form alone is another there.
-
-    A parameter of an effect's dimension that does what it does, and that the refit leaves where its prior
-    believes it, is that effect: nothing is missing. What its form leaves is another matter.
-    """
-    for step in steps:
-        applied = next(each for each in base.active if each.key == step.active.key)
-        remaining = without(base.active, applied)
-        sizes = [each for each in applied.searched if each.off is not None]
-        if len(sizes) != 1 or applied.runs is not None or not problem.declared:
-            continue
-        try:
-            shared = _shared(problem, base, remaining)
-            at = int(np.argmax(shared))
-            own = unit_of(problem.case, problem.model, applied, sizes[0].name)
-            alike = dimension(own) == dimension(problem.free[at].unit) and shared[at] > VERDICT.own
-            if not alike or abs(problem.off_priors(refitted.p)[at]) > PRIORS.far:
-                continue
-            bare = fit(problem, remaining, start=base.p)
-            scores = hold_out(problem, folds, bare.active, bare)
-        except FitError:  # the simulation needs it
-            continue
-        listed = [each for each in steps if each is not step]
-        return without_own_terms(problem, folds, refitted, bare, scores, listed)
-    return base, held_base, steps
 
 
 def _alike(problem: Problem, base: Fit, applied: AppliedEffect) -> ParameterInPlace | None:
@@ -96,30 +60,9 @@ def _alike(problem: Problem, base: Fit, applied: AppliedEffect) -> ParameterInPl
 
 def _nearest(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...]) -> int | None:
     """Return the place of the parameter whose response is most like an effect's; None where none is."""
-    shared = _shared(problem, base, active)
+    shared = shared_responses(problem, base, active)
     best = int(np.argmax(shared))
     return best if 1 - shared[best] < LAWS.alike else None
-
-
-def _shared(problem: Problem, base: Fit, active: tuple[AppliedEffect, ...]) -> Array:
-    """Return the share of what an effect does that each declared parameter does, (declared,).
-
-    Parameters
-    ----------
-    active : the effects of the fit but for the one
-    """
-    bare = problem.simulate(base.p, active)
-    columns, _ = jacobian(problem, replace(base, active=active))
-    layouts = {name: problem.layout(name) for name in problem.names}
-    moved, answers = (
-        np.concatenate([whiten(each[name][at.index], at, base.noise[name]) for name, at in layouts.items()])
-        for each in (
-            {name: (base.simulated[name] - bare[name])[:, None] for name in problem.names},
-            {name: columns[name][:, : len(problem.declared)] for name in problem.names},
-        )
-    )
-    sizes = np.sum(moved**2) * np.sum(answers**2, axis=0)
-    return np.asarray((moved[:, 0] @ answers) ** 2 / np.maximum(sizes, 1e-300))
 
 
 def _likelihood(problem: Problem, made: Fit) -> float:

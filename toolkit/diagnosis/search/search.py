@@ -30,8 +30,8 @@ from toolkit.diagnosis.search.forward_step import Step, best_step, joint_fits, s
 from toolkit.diagnosis.search.in_place import foretold_best
 from toolkit.diagnosis.search.lattice import lattice_of
 from toolkit.diagnosis.search.noise_floor import hidden_in_noise, may_leave_noise, weighed_as_mismatch
+from toolkit.diagnosis.search.own_terms import without_own_terms
 from toolkit.diagnosis.search.pairs import best_pair
-from toolkit.diagnosis.search.parameters_alike import without_own_terms
 from toolkit.diagnosis.search.proposals import NONE, proposals
 from toolkit.diagnosis.search.proposed_step import beside_rivals, proposed_step
 from toolkit.diagnosis.search.screen import LinearisedFit, Scored

@@ -17,7 +17,7 @@ from toolkit.diagnosis.fit.folds import folds_of, hold_out
 from toolkit.diagnosis.fit.problem import problem_of
 from toolkit.diagnosis.search.candidates import candidates
 from toolkit.diagnosis.search.forward_step import Step, joint_fit
-from toolkit.diagnosis.search.parameters_alike import without_own_terms
+from toolkit.diagnosis.search.own_terms import without_own_terms
 from toolkit.diagnosis.simulators.build_simulator import model_of
 
 JOINT = """
