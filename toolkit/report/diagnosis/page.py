@@ -38,6 +38,11 @@ HEADLINES = {
     "nothing": "Nothing is missing that this recording could show.",
     "untestable": "This recording cannot tell.",
 }
+# Where effects take less than half of what is above the noise, and more is left than noise.
+_PARTLY = {
+    "named": "A part of what is missing has a name.",
+    "equivalent": "A class of effects explains a part of the mismatch; this recording cannot tell them apart.",
+}
 RUNS_DIFFER = (
     "Runs differ by more than their noise; within the runs nothing is missing that this recording could show."
 )
@@ -117,11 +122,16 @@ def _verdict(diagnosis: Diagnosis) -> str:
         return f"{missing} Its law was learned: {_first_law(diagnosis)}."
     if diagnosis.verdict == "named" and not any(map(is_told_from_none, diagnosis.effects)):
         return "A known effect may explain the mismatch; none of its sizes is told from none."
-    if diagnosis.effects and diagnosis.remaining == "unknown" and diagnosis.laws:
-        return f"{HEADLINES[diagnosis.verdict]} What is left follows a law: {_first_law(diagnosis)}."
     if diagnosis.effects and diagnosis.remaining == "unknown":
         # Who reads the first line alone must not take a name for the whole of it.
-        return f"{HEADLINES[diagnosis.verdict]} More is left that no known effect explains{_size(diagnosis)}."
+        explained = _explained(diagnosis)
+        minor = explained is not None and explained[0] < 0.5
+        said = (_PARTLY if minor else HEADLINES)[diagnosis.verdict]
+        if diagnosis.laws:
+            return f"{said} What is left follows a law: {_first_law(diagnosis)}."
+        return (
+            f"{said} {'Most' if minor else 'More'} is left that no known effect explains{_size(diagnosis)}."
+        )
     return HEADLINES[diagnosis.verdict]
 
 
@@ -157,21 +167,28 @@ def cause(diagnosis: Diagnosis) -> str | None:
         ]
         told = is_told_from_none(effect)
         names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect), *sizes))))
+    explained = _explained(diagnosis)
+    listed = "; ".join(name for _, name in sorted(names, key=lambda entry: entry[0]))
+    listed = listed[0].upper() + listed[1:] if listed.startswith("perhaps ") else listed
+    if explained is None:
+        return listed + "."
+    share, channel = explained
+    share_text = f"{100 * share:.0f} % of the mean square by which {channel} is off beyond its noise"
+    return f"{listed}: explains {share_text}, on rows that no fit has seen."
+
+
+def _explained(diagnosis: Diagnosis) -> tuple[float, str] | None:
+    """Return the largest share of an output's mean square above its noise that effects take, and which it is.
+
+    Of rows that no fit has seen; None where they take nothing of any.
+    """
     shares = []
     for fit in diagnosis.fit.held_out:
         above = fit.refitted_rmse**2 - min(fit.noise_floor, fit.augmented_rmse) ** 2
         explained = fit.refitted_rmse**2 - fit.augmented_rmse**2
         if above > 0 and explained > 0:
-            shares.append((explained, above, fit.channel))
-    listed = "; ".join(name for _, name in sorted(names, key=lambda entry: entry[0]))
-    listed = listed[0].upper() + listed[1:] if listed.startswith("perhaps ") else listed
-    if not shares:
-        return listed + "."
-    explained, above, channel = max(shares, key=lambda share: share[0] / share[1])
-    share_text = (
-        f"{100 * explained / above:.0f} % of the mean square by which {channel} is off beyond its noise"
-    )
-    return f"{listed}: explains {share_text}, on rows that no fit has seen."
+            shares.append((explained / above, fit.channel))
+    return max(shares, default=None)
 
 
 def is_told_from_none(effect: DiagnosedEffect) -> bool:
