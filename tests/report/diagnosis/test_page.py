@@ -277,6 +277,19 @@ def test_the_first_line_says_that_a_name_is_not_the_whole(dragged):
     )
 
 
+def test_the_first_line_does_not_call_a_fifth_the_missing_physics(dragged):
+    """A servo's lag took 21 % of what was off: 0.125 rad without, 0.111 rad with it, 0.0014 rad of noise."""
+    answer = dragged.diagnosis
+    (fit,) = answer.fit.held_out
+    errors = dataclasses.replace(fit, refitted_rmse=0.12492, augmented_rmse=0.11084, noise_floor=0.00138)
+    of_rows = dataclasses.replace(answer.fit, held_out=(errors,))
+    servo = dataclasses.replace(answer, remaining="unknown", fit=of_rows)
+    assert "explains 21 % of the mean square" in (cause(servo) or "")
+    assert headline(servo).startswith(
+        "A part of what is missing has a name. Most is left that no known effect"
+    )
+
+
 @pytest.mark.parametrize("skipped", [(), ("step 2: screening 150 candidates",)])
 def test_the_first_line_says_how_large_is_what_has_no_name(dragged, skipped):
     """A house: 0.21 K of a temperature that varies by 4.7 K is 4.5 %; an answer of old does not know it."""

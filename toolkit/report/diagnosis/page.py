@@ -41,7 +41,7 @@ HEADLINES = {
 # Where effects take less than half of what is above the noise, and more is left than noise.
 _PARTLY = {
     "named": "A part of what is missing has a name.",
-    "equivalent": "A class of effects explains a part of the mismatch; this recording cannot tell them apart.",
+    "equivalent": "A class of effects explains a part of it; this recording cannot tell them apart.",
 }
 RUNS_DIFFER = (
     "Runs differ by more than their noise; within the runs nothing is missing that this recording could show."
@@ -129,9 +129,8 @@ def _verdict(diagnosis: Diagnosis) -> str:
         said = (_PARTLY if minor else HEADLINES)[diagnosis.verdict]
         if diagnosis.laws:
             return f"{said} What is left follows a law: {_first_law(diagnosis)}."
-        return (
-            f"{said} {'Most' if minor else 'More'} is left that no known effect explains{_size(diagnosis)}."
-        )
+        much = "Most" if minor else "More"
+        return f"{said} {much} is left that no known effect explains{_size(diagnosis)}."
     return HEADLINES[diagnosis.verdict]
 
 
