@@ -42,7 +42,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         said = io.StringIO()
         with contextlib.redirect_stdout(said), pytest.raises(SystemExit) as ended:
             run(["plan", kind, *words, "--home", str(home), "--out", str(home / "plans" / kind), "--json"])
-        assert ended.value.code in (0, None)
+        # The example was calibrated years ago: its next calibration is overdue, and the plan says so.
+        assert ended.value.code == (1 if kind == "interval" else 0) or ended.value.code is None
         (home / f"plan-{kind}.json").write_text(said.getvalue())
     (home / "diagnoses" / "cell").mkdir(parents=True)
     (home / "diagnoses" / "cell" / "diagnosis.json").write_text(json.dumps(ANSWER))
