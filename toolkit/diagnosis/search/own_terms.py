@@ -30,8 +30,8 @@ def without_own_terms(
 ) -> tuple[Fit, HeldOut, list[Step]]:
     """Return a hypothesis without effects that the simulation has, whose form alone is another there.
 
-    A parameter of an effect's dimension that does what it does, and that the refit leaves where its prior
-    believes it, is that effect: nothing is missing. What its form leaves is another matter.
+    A parameter of an effect's dimension, if it has one, that does what it does, and that the refit leaves
+    where its prior believes it, is that effect: nothing is missing. What its form leaves is another matter.
     """
     for step in steps:
         applied = next(each for each in base.active if each.key == step.active.key)
@@ -42,8 +42,10 @@ def without_own_terms(
         try:
             shared = shared_responses(problem, base, remaining)
             at = int(np.argmax(shared))
-            own = unit_of(problem.case, problem.model, applied, sizes[0].name)
-            alike = dimension(own) == dimension(problem.free[at].unit) and shared[at] > VERDICT.own
+            own = dimension(unit_of(problem.case, problem.model, applied, sizes[0].name))
+            # A ratio is as much a gain's as a share's, and tells nothing.
+            alike = own != dimension("1") and own == dimension(problem.free[at].unit)
+            alike = alike and shared[at] > VERDICT.own
             if not alike or abs(problem.off_priors(refitted.p)[at]) > PRIORS.far:
                 continue
             bare = fit(problem, remaining, start=base.p)
