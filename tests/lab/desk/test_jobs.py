@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from toolkit.errors import ConfigError
 from toolkit.lab.desk.jobs import (
     FOLDER,
+    LOCK,
     Job,
     SeenJob,
     cancel_job,
@@ -24,6 +26,7 @@ from toolkit.lab.desk.jobs import (
     write_job,
 )
 from toolkit.lab.progress_note import ProgressNote, note_of, read_note
+from toolkit.system import lock_folder
 
 ARCHIVE = ("audit", "archive", "--home", ".")
 
@@ -82,6 +85,16 @@ def test_a_second_job_is_refused_while_one_runs_and_the_first_can_be_cancelled(h
     assert until(home, job_id, over).state == "cancelled"
     # Its runner is gone: the next one is taken.
     second = until(home, start_job(home, kind="audit", title="second", words=ARCHIVE), over)
+    assert second.state == "clean"
+
+
+def test_a_runner_that_has_written_its_end_and_is_not_gone_yet_is_waited_for(home: Path) -> None:
+    """The page says that the job is over, and a busy computer takes a second to end its process."""
+    until(home, start_job(home, kind="audit", title="first", words=ARCHIVE), over)
+    with (home / FOLDER / LOCK).open("ab") as leaving:
+        lock_folder(leaving.fileno(), shared=False, wait=True)
+        threading.Timer(1.0, leaving.close).start()
+        second = until(home, start_job(home, kind="audit", title="second", words=ARCHIVE), over)
     assert second.state == "clean"
 
 

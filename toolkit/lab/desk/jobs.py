@@ -39,6 +39,7 @@ FOLDER, FILE, LOG, PROGRESS, CANCEL, LOCK = "jobs", "job.toml", "log", "progress
 ID = re.compile(r"\d{8}T\d{6}-[0-9a-f]{8}")
 _LOG_SHOWN = 20_000  # bytes of a log's end
 _PROBES, _PAUSE = 5, 0.05  # somebody else who only looks holds the lock for microseconds
+_LEAVING = 10.0  # seconds that a process may take to be gone after it has written its end
 
 Level = Literal["warning", "error"]
 Kind = Literal["audit", "repair", "preview", "report", "diagnosis", "plan"]
@@ -82,11 +83,15 @@ def start_job(home: Path, *, kind: Kind, title: str, words: Sequence[str]) -> st
     folder = home / FOLDER
     folder.mkdir(exist_ok=True)
     with open_regular_to_append(folder / LOCK) as lock:
-        if not _taken(lock):
+        ends = time.monotonic() + _LEAVING
+        while not _taken(lock):
             running = next((seen for seen in jobs_of(home) if seen.state == "running"), None)
+            if running is None and time.monotonic() < ends:
+                continue
             raise ConfigError(
                 "a job of this home is not done yet", where=folder,
-                got="a job that runs" if running is None else f"{running.job.kind} of {running.job.title}",
+                got="a process that holds its lock"
+                if running is None else f"{running.job.kind} of {running.job.title}",
                 expected="one job at a time for each home",
                 next_step="wait for its end, or cancel it; nothing was started", rule="job-running",
             )  # fmt: skip
