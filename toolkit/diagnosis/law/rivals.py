@@ -149,16 +149,17 @@ def _own_formula(search: Search, alone: Laws) -> Search | None:
     problem, first = search.problem, _whole(alone.listed)[:1]
     added = [each.applied for law in first for each in law.together]
     try:
-        made = fit(problem, added, start=alone.fit.p)
-        by_law = hold_out(problem, search.folds, made.active, made)
+        of_law = fit(problem, added, start=alone.fit.p)
+        unseen_of_law = hold_out(problem, search.folds, of_law.active, of_law)
         for step in _effects(search):
-            named = fit(problem, (step.active,), start=search.augmented.p)
-            held_out = hold_out(problem, search.folds, named.active, named)
-            if take_as_much(problem, search.held_refitted, held_out, by_law, least=least_share(named, made)):
-                gained = held_out.total - search.held_refitted.total
-                alone_step = replace(step, active=named.active[0], held_out_gain=gained, rivals=())
+            of_effect = fit(problem, (step.active,), start=search.augmented.p)
+            unseen = hold_out(problem, search.folds, of_effect.active, of_effect)
+            least = least_share(of_effect, of_law)
+            if take_as_much(problem, search.held_refitted, unseen, unseen_of_law, least=least):
+                gained = unseen.total - search.held_refitted.total
+                alone_step = replace(step, active=of_effect.active[0], held_out_gain=gained, rivals=())
                 return replace(
-                    search, steps=(alone_step,), augmented=named, held_augmented=held_out,
+                    search, steps=(alone_step,), augmented=of_effect, held_augmented=unseen,
                     structure=search.structure_before,
                 )  # fmt: skip
     except FitError:

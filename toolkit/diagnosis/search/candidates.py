@@ -20,6 +20,7 @@ from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.effects.facts import Values
 from toolkit.effects.filters import lag
 from toolkit.effects.signals import Drive, Setting, Tire
+from toolkit.files import reads_as_number
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.fit.problem import Problem
@@ -304,7 +305,7 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
             if key in run.conditions:
                 levels.setdefault(run.conditions[key], []).append(run.name)
         apart = key not in effect.confined_by and len(levels) == len(problem.runs) > 2
-        if len(levels) < 2 or (apart and all(_is_number(level) for level in levels)):
+        if len(levels) < 2 or (apart and all(map(reads_as_number, levels))):
             continue
         ordered = _in_order(list(levels))
         groups: list[Sequence[str]] = [[level] for level in ordered]
@@ -317,12 +318,4 @@ def _subsets(problem: Problem, effect: Effect) -> list[frozenset[str]]:
 
 
 def _in_order(levels: list[str]) -> list[str]:
-    return sorted(levels, key=float) if all(_is_number(level) for level in levels) else sorted(levels)
-
-
-def _is_number(level: str) -> bool:
-    try:
-        float(level)
-    except ValueError:
-        return False
-    return True
+    return sorted(levels, key=float) if all(map(reads_as_number, levels)) else sorted(levels)

@@ -329,9 +329,9 @@ def _searched(
     scatter: tuple[RunScatter, ...] = ()
     if steps:
         with contextlib.suppress(BudgetSpentError):
-            told = len(steps)
+            before_scatter = len(steps)
             base, held_base, steps, scatter = _beside_scatter(problem, folds, base, held_base, steps)
-            if len(steps) < told:  # beside what went, what stays was another effect
+            if len(steps) < before_scatter:  # beside what went, what stays was another effect
                 base, held_base, steps = told_from_none(
                     problem, folds, base, held_base, steps, trust=screen.trust(base.noise)
                 )

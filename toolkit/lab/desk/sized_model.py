@@ -26,7 +26,7 @@ from toolkit.lab.desk.chart import Chart, Series, sampling
 from toolkit.lab.desk.holdings import CASE, Holdings
 from toolkit.lab.desk.uploads import claimed_folder
 from toolkit.publication import publication
-from toolkit.report.diagnosis.page import headline
+from toolkit.report.diagnosis.page import explains_a_part, headline
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
@@ -227,11 +227,13 @@ _MOST_CHARTS = 24
 class SeenDiagnosis:
     """An answer as its file has it; ``headline`` is the first line of its own page.
 
+    ``partly`` tells that its effects are the smaller part of what is off.
     ``figures`` are (text, address of the picture), ``charts`` (file and channel, chart).
     """
 
     answer: dict[str, Any]
     headline: str
+    partly: bool
     figures: tuple[tuple[str, str], ...]
     charts: tuple[tuple[str, Chart], ...]
 
@@ -253,6 +255,7 @@ def read_diagnosis(folder: Path) -> SeenDiagnosis:
     return SeenDiagnosis(
         answer=answer,
         headline=headline(diagnosis, with_cause=True),
+        partly=explains_a_part(diagnosis),
         figures=tuple(_figures(folder / PAGE)),
         charts=tuple(chart for _, chart in charts),
     )

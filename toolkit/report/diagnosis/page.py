@@ -38,8 +38,7 @@ HEADLINES = {
     "nothing": "Nothing is missing that this recording could show.",
     "untestable": "This recording cannot tell.",
 }
-# Where effects take less than half of what is above the noise, and more is left than noise.
-_PARTLY = {
+PARTLY = {
     "named": "A part of what is missing has a name.",
     "equivalent": "A class of effects explains a part of it; this recording cannot tell them apart.",
 }
@@ -124,14 +123,21 @@ def _verdict(diagnosis: Diagnosis) -> str:
         return "A known effect may explain the mismatch; none of its sizes is told from none."
     if diagnosis.effects and diagnosis.remaining == "unknown":
         # Who reads the first line alone must not take a name for the whole of it.
-        explained = _explained(diagnosis)
-        minor = explained is not None and explained[0] < 0.5
-        said = (_PARTLY if minor else HEADLINES)[diagnosis.verdict]
+        minor = explains_a_part(diagnosis)
+        verdict = (PARTLY if minor else HEADLINES)[diagnosis.verdict]
         if diagnosis.laws:
-            return f"{said} What is left follows a law: {_first_law(diagnosis)}."
+            return f"{verdict} What is left follows a law: {_first_law(diagnosis)}."
         much = "Most" if minor else "More"
-        return f"{said} {much} is left that no known effect explains{_size(diagnosis)}."
+        return f"{verdict} {much} is left that no known effect explains{_size(diagnosis)}."
     return HEADLINES[diagnosis.verdict]
+
+
+def explains_a_part(diagnosis: Diagnosis) -> bool:
+    """Tell whether effects leave more above the noise than they take, on rows that no fit has seen."""
+    if not diagnosis.effects or diagnosis.remaining != "unknown":
+        return False
+    explained = _explained(diagnosis)
+    return explained is not None and explained[0] < 1 - explained[0]
 
 
 def _size(diagnosis: Diagnosis) -> str:
