@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import html
 import json
 import re
@@ -14,6 +15,7 @@ import pytest
 from tests.built_once import built_once
 from tests.workbench.conftest import ROOT, Served, plain, serving
 from tests.workbench.test_jobs_page import done
+from tests.workbench.test_page import ANSWER as WHOLE
 from toolkit.errors import UnreadableError
 from toolkit.lab.desk.holdings import holding_id
 from toolkit.lab.desk.sized_model import read_diagnosis
@@ -177,3 +179,27 @@ def test_only_ids_have_pages(home: Path) -> None:
         assert bench.page("/diagnosis/cases%2Fcell").status == 404
         assert bench.send("/case/..%2F../diagnose", {}).status == 404
         assert bench.send(f"/case/{holding_id('cases')}/diagnose", {}).status == 404
+
+
+@pytest.mark.parametrize(
+    ("language", "sentence"),
+    [
+        ("en", "A part of what is missing has a name."),
+        ("de", "Ein Teil dessen, was fehlt, hat einen Namen."),
+        ("fr", "Une partie de ce qui manque a un nom."),
+    ],
+)
+def test_a_small_name_is_a_part_in_every_language(tmp_path: Path, language: str, sentence: str) -> None:
+    """A servo's lag took 21 % of what was off: 0.125 rad without, 0.111 rad with it, 0.0014 rad of noise."""
+    home = tmp_path / "lab"
+    shutil.copytree(ROOT / "calibrations", home / "calibrations")
+    (home / "diagnoses" / "servo").mkdir(parents=True)
+    answer = copy.deepcopy(WHOLE) | {"verdict": "named", "remaining": "unknown"}
+    answer["fit"]["held_out"] = [
+        channel | {"refitted_rmse": 0.12492, "augmented_rmse": 0.11084, "noise_floor": 0.00138}
+        for channel in answer["fit"]["held_out"]
+    ]
+    (home / "diagnoses" / "servo" / "diagnosis.json").write_text(json.dumps(answer))
+    with serving(home) as bench:
+        page = bench.page(f"/diagnosis/{holding_id('diagnoses/servo')}", **{"Accept-Language": language})
+    assert sentence in plain(page.body)
