@@ -19,7 +19,9 @@ from toolkit.system import can_fork
 # A start costs 1.2 s of processor time, a short document 0.1 s. LibreOffice hands a job over to the instance
 # that has its profile, and that instance stays for as long as it has a document open; the lock beside the
 # document tells that it has. The toolkit's own instance, which waits for a job, has nothing to do. One job at
-# a time; who asks for anything but a conversion gets LibreOffice itself.
+# a time; who asks for anything but a conversion gets LibreOffice itself. A test may
+# kill the script that starts it: the instance itself writes down who it is, or nobody would end or find again
+# what was started; whoever comes next waits until it is ready; a process that is dead and not reaped is gone.
 _SCRIPT = """#!/bin/sh
 folder={folder} office={office} profile=-env:UserInstallation=file://{folder}/profile
 case "$1$*" in
@@ -29,15 +31,18 @@ case "$1$*" in
 esac
 exec 9>"$folder/lock"
 flock 9
-if ! kill -0 "$(cat "$folder/pid" 2>&-)" 2>&-; then
-    rm -f "$folder/.~lock.open.docx#"
-    cd "$folder"
-    env -i PATH="$PATH" HOME={home} TMPDIR="$folder" LC_ALL=C.UTF-8 SAL_USE_VCLPLUGIN=svp setsid "$office" \\
-        "$profile" --headless --norestore --nologo --nodefault open.docx </dev/null >/dev/null 2>&1 9>&- &
-    echo $! >"$folder/pid"
-    while kill -0 $! && ! test -e ".~lock.open.docx#"; do sleep 0.05; done
-    cd "$OLDPWD"
+lives() {{ case "$(cat "/proc/$(cat pid || echo none)/stat" 2>&-)" in ""|*") Z "*) return 1 ;; esac; }} 2>&-
+cd "$folder"
+if ! lives; then
+    rm -f pid ".~lock.open.docx#"
+    env -i PATH="$PATH" HOME={home} TMPDIR="$folder" LC_ALL=C.UTF-8 SAL_USE_VCLPLUGIN=svp \\
+        setsid sh -c 'echo $$ >pid; exec "$@"' sh \\
+        "$office" "$profile" --headless --norestore --nologo --nodefault open.docx \\
+        </dev/null >/dev/null 2>&1 9>&- &
+    while kill -0 $! 2>&- && ! test -s pid; do sleep 0.02; done
 fi
+while lives && ! test -e ".~lock.open.docx#"; do sleep 0.05; done
+cd "$OLDPWD"
 "$office" "$profile" "$@" 9>&-
 """
 
