@@ -148,7 +148,8 @@ def _diagnosed(
                 outcome = kept_beside_laws(outcome, laws)
                 if outcome.kept:
                     laws = learned(outcome, withdrawn=False, budget=budget)
-                outcome, laws = learned_by_size(outcome, laws, budget)
+                if mostly_unknown(outcome) or not outcome.steps:
+                    outcome, laws = learned_by_size(outcome, laws, budget)
                 outcome, laws = without_imitations(outcome, laws, budget)
                 outcome, laws = judged_by_laws(outcome, laws, seed=seed, budget=budget)
                 outcome = without_untested(outcome, laws)

@@ -331,12 +331,8 @@ class _Unseen:
 class _Following:
     """What the prediction errors of an equation along its recording propose."""
 
-    least: float = _set(
-        0.1, "of the prediction errors' square", "what takes less is left to the screen of free simulations"
-    )
-    later: float = _set(
-        0.03, "of what the terms before leave", "a second term beside a large one is fitted with it"
-    )
+    least: float = _set(0.1, "of the prediction errors' square", "less is left to the free simulations")
+    later: float = _set(0.03, "of what the terms before leave", "a second term is fitted with a large one")
     together: int = _set(2, "terms", "are fitted at once; a third is looked for beside them")
     steadier: tuple[int, ...] = _set(
         (3, 10, 30, 100),
@@ -417,12 +413,13 @@ class _Laws:
     refined: int = _set(10, "laws", "whose shape is moved to its best before their gain is computed")
     rounds: int = _set(12, "rounds", "in which each law moves to its best neighbour or halves its steps")
     fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
+    along: int = _set(2, "laws", "of these, of those that take most of the errors from row to row")
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
     same: float = _set(
         0.95, "of what laws take of the held-out mean square", "by effects: the laws are their own formulas"
     )
-    outdoes: float = _set(2.0, "times what effects take", "of unseen rows: they are the smaller part")
+    outdoes: float = _set(2.0, "times what effects take", "of unseen rows, by laws or left: they are minor")
     kept: float = _set(
         0.5, "of its size", "by which an effect may be smaller or larger beside laws and be the same effect"
     )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from toolkit.diagnosis.answer import naming
+from toolkit.diagnosis.fit.structure import RUNS
 from toolkit.diagnosis.law import rivals
 from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.effects.applied import AppliedEffect
@@ -69,6 +70,21 @@ def test_a_name_is_not_withdrawn_for_a_law_that_takes_no_more(monkeypatch, left,
     assert naming.mostly_unknown(found)
     assert naming.kept_beside_laws(found, laws).kept is kept
     assert naming.mostly_unknown(naming.kept_beside_laws(found, laws)) is not kept
+
+
+@pytest.mark.parametrize(("variables", "unknown"), [(("u",), True), (RUNS, False)])
+@pytest.mark.usefixtures("plain")
+def test_what_leaves_several_times_what_it_takes_is_no_name_where_the_rest_is_no_noise(variables, unknown):
+    """A lag takes a fifth of the error of a servo that turns only so fast; a colour makes noise of the rest.
+
+    Of zeros that move from run to run nothing is said of what is left within them: it stays noise.
+    """
+    found = search(explained=60.0, unexplained=1.0, before=0.71, after=0.63)
+    found.problem.stated_sd = lambda _: None
+    (output,), (rest,) = found.errors, found.structure
+    output.noise_floor, output.sensor_sd, rest.variables = 0.60, 0.01, variables
+    found.augmented = Of(residual={"y": 0.60 / 0.63 * found.held_augmented.simulated["y"]})
+    assert naming.mostly_unknown(found) is unknown
 
 
 @pytest.mark.parametrize(("step", "unknown"), [("step 3: joint fits", False), ("swaps", True)])

@@ -65,11 +65,7 @@ def judged_unit(problem: Problem, output: Output) -> str:
 
 
 def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) -> tuple[HeldOutChannel, ...]:
-    """Return held-out errors with those that the laws leave beside them; an event tells nothing there.
-
-    What effects or laws leave is no measure of them: where it is not shown to be noise, the noise is the
-    sensor's own, if that is less. Zeros that differ from run to run say nothing of the noise within.
-    """
+    """Return held-out errors with those that the laws leave beside them; an event tells nothing there."""
     problem, predicts = search.problem, any(law.predicts for law in laws.listed)
     told = []
     for output in errors:
@@ -77,13 +73,27 @@ def with_laws(search: Search, laws: Laws, errors: tuple[HeldOutChannel, ...]) ->
         if predicts:
             away = problem.judged(name, problem.observed[name] - laws.held_out.simulated[name])
             rmse = math.sqrt(float(np.mean(away**2)))
-        stays = any(part.output == name and part.variables != RUNS for part in search.structure)
-        floor = output.noise_floor
-        if (predicts or stays) and problem.stated_sd(name) is None:
-            sensor = math.inf if output.sensor_sd is None else output.sensor_sd
-            floor = min(floor, rmse, sensor)
+        floor = shown_noise(search, output, is_noise=not predicts)
+        if problem.stated_sd(name) is None:
+            floor = min(floor, rmse)
         told.append(replace(output, with_laws_rmse=rmse if predicts else None, noise_floor=floor))
     return tuple(told)
+
+
+def shown_noise(search: Search, output: HeldOutChannel, *, is_noise: bool = True) -> float:
+    """Return an output's noise: where what effects leave is not shown to be any, the sensor's own, if less.
+
+    What they leave is no measure of them. Zeros that differ from run to run say nothing of the noise within.
+
+    Parameters
+    ----------
+    is_noise : nothing else tells that there is more in the rest
+    """
+    stays = any(part.output == output.channel and part.variables != RUNS for part in search.structure)
+    stated = search.problem.stated_sd(output.channel) is not None
+    if stated or output.sensor_sd is None or (is_noise and not stays):
+        return output.noise_floor
+    return min(output.noise_floor, output.sensor_sd)
 
 
 def _floor(search: Search, name: str, sd: float | None) -> float:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.answer.answer import cut_short
-from toolkit.diagnosis.answer.held_out_errors import held_out_errors
+from toolkit.diagnosis.answer.held_out_errors import held_out_errors, shown_noise
 from toolkit.diagnosis.answer.next_measurements import implausible
 from toolkit.diagnosis.fit.sensor_noise import spread
 from toolkit.diagnosis.fit.structure import RUNS
 from toolkit.diagnosis.law.rivals import least_share, parameters_of, take_as_much
-from toolkit.diagnosis.policy import SCREENING, VERDICT
+from toolkit.diagnosis.policy import LAWS, SCREENING, VERDICT
 from toolkit.diagnosis.search.bends import is_outsized
 from toolkit.diagnosis.search.search import Search
 from toolkit.diagnosis.search.superfluous import takes_nearly_all
@@ -72,13 +72,16 @@ def outweighed(search: Search) -> bool:
     """Tell whether what stays outweighs what effects explain.
 
     By what they take of the held-out mean square that is above the noise; where none is, by the
-    log-likelihood. Nothing outweighs effects that take more of an output's unseen rows than they leave there,
-    nor a rest of which a search that was cut short has not seen what it is.
+    log-likelihood. A rest that is no noise is above it, and outweighs effects of which it is several times as
+    much. Nothing outweighs those that take more of an output's unseen rows than they leave there, nor a rest
+    of which a search that was cut short has not seen what it is.
     """
     if not search.structure or (search.steps and cut_short(search.skipped)):
         return False
+    if _takes_more_than_is_left(search):
+        return False
     shown = _taken(search)
-    if any(removed >= VERDICT.taken * above for removed, above in shown) or _takes_more_than_is_left(search):
+    if any(removed >= VERDICT.taken * above for removed, above in shown) and not _are_minor(search):
         return False
     if all(step.active.effect.from_digits for step in search.steps):
         return not search.steps  # read off the digits: it does not imitate anything
@@ -87,6 +90,21 @@ def outweighed(search: Search) -> bool:
     )
     explained = sum(step.gain for step in search.steps)
     return bool(shown) or explained < VERDICT.mostly * (explained + unexplained)
+
+
+def _are_minor(search: Search) -> bool:
+    """Tell whether effects leave several times what they take, in every output that shows a mismatch.
+
+    Of unseen rows, above what is shown to be noise: what they leave may be none.
+    """
+    parts = []
+    for output in held_out_errors(search, unknown=False):
+        noise, before, after = (
+            each**2 for each in (shown_noise(search, output), output.refitted_rmse, output.augmented_rmse)
+        )
+        if before > VERDICT.shown * noise:
+            parts.append(after - noise > LAWS.outdoes * (before - after))
+    return bool(parts) and all(parts)
 
 
 def _is_smooth(search: Search) -> bool:

@@ -20,6 +20,7 @@ from toolkit.diagnosis.fit.folds import hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
+from toolkit.diagnosis.law.row_to_row import shown_from_row_to_row
 from toolkit.diagnosis.law.terms import joint_terms_of, pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
@@ -32,7 +33,7 @@ from toolkit.diagnosis.law.unseen_runs import laws_on_unseen_runs
 from toolkit.diagnosis.policy import LAWS, PRIORS, SCREENING, STEP, STRUCTURE, VERDICT
 from toolkit.diagnosis.search.bends import at_bound
 from toolkit.diagnosis.search.forward_step import joint_fit
-from toolkit.diagnosis.search.noise_floor import may_leave_noise
+from toolkit.diagnosis.search.noise_floor import is_beyond_noise, may_leave_noise
 from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.search.time_budget import BudgetSpentError, TimeBudget
 from toolkit.errors import FitError
@@ -123,11 +124,18 @@ def learned(search: Search, *, withdrawn: bool, budget: TimeBudget) -> Laws:
 def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Search, Laws]:
     """Return a search without effects and its laws, by the rest's size where these foretell far better.
 
-    Asked where the laws that rows show leave what is no noise; not of equations, whose own noise is coloured.
+    Asked where the laws that rows show leave what is no noise. The own noise of an equation is coloured: its
+    rest has to be more than any.
+
+    Parameters
+    ----------
+    search : one that names nothing
     """
     by_size, problem = search.by_size, search.problem
     motion = problem.model.capability.motion
-    if search.steps or by_size is None or not laws.complete or (motion is not None and motion.integrates):
+    if by_size is None or not laws.complete:
+        return search, laws
+    if motion is not None and motion.integrates and not is_beyond_noise(problem, search.refitted):
         return search, laws
     if laws.listed and may_leave_noise(by_size.problem, search.refitted, laws.fit):
         return search, laws
@@ -208,10 +216,12 @@ def _next(
         trial for trial in ranked(problem, base, screen, trials, weight) if p_value(trial, looked) < alpha
     ]
     near = [trial for trial in likely if trial.gain > STEP.far_behind * likely[0].gain]
-    near = near[: LAWS.fitted]
+    along = shown_from_row_to_row(problem, base, trials, weight)[: LAWS.along]
+    shown = {trial.place for trial, _ in along}
+    near = [trial for trial in near if trial.place not in shown][: LAWS.fitted - len(along)]
     # Two equations at once are ranked with no single one: each of them is fitted.
     near += [trial for trial in joint if p_value(trial, looked) < alpha]
-    fitted = _fitted(problem, base, near, weight)
+    fitted = _fitted(problem, base, [*along, *((trial, None) for trial in near)], weight)
     if fitted and (drawn := curve_trial(problem, fitted[0][1])) is not None:
         best = fitted[0][0] - base.log_posterior
         curves = [
@@ -219,7 +229,7 @@ def _next(
             for trial in ranked(problem, base, screen, [drawn], weight)
             if 0.5 * trial.gain - weight * trial.cost > best
         ]
-        fitted += _fitted(problem, base, curves, weight)
+        fitted += _fitted(problem, base, [(trial, None) for trial in curves], weight)
     # What was met once explains and does not predict: it is asked where nothing that predicts stands.
     for events in (False, True):
         entries = [entry for entry in fitted if (entry[1].form == "event") is events]
@@ -254,21 +264,22 @@ def _by_unseen_runs(
 
 
 def _fitted(
-    problem: Problem, base: Fit, trials: Sequence[Trial], weight: float
+    problem: Problem, base: Fit, trials: Sequence[tuple[Trial, tuple[float, ...] | None]], weight: float
 ) -> list[tuple[float, Trial, Fit]]:
     """Return joint fits with their log-posterior less their parameters' cost, the best first.
 
-    One that can neither be among those that are judged nor pass for as good as the best is not ended.
+    Each begins at the parameters beside it, or where there are none at those of the base. One that can
+    neither be among those that are judged nor pass for as good as the best is not ended.
     """
     fitted: list[tuple[float, Trial, Fit]] = []
-    for trial in trials:
+    for trial, begin in trials:
         scores = sorted(
             score for score, other, _ in fitted if (other.form == "event") is (trial.form == "event")
         )
         least = -math.inf
         if len(scores) >= LAWS.judged:
             least = min(scores[-LAWS.judged], scores[-1] - VERDICT.close) + weight * trial.cost
-        refit = joint_fit(problem, base, trial.together, least=least)
+        refit = joint_fit(problem, base, trial.together, begin=begin, least=least)
         if refit is None or refit.log_posterior < least:
             continue
         if not any(map(at_bound, refit.active[-len(trial.together) :])):

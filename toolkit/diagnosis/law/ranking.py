@@ -190,21 +190,26 @@ def _formula(applied: AppliedEffect) -> Formula:
     return parts_of(applied.effect.name)[1]
 
 
+def pattern_of(trials: Sequence[Trial]) -> TermPattern:
+    """Return laws as terms of the equation of one state, a column for each amplitude, of one."""
+    return TermPattern(
+        tuple(
+            (
+                trial.applied.effect,
+                tuple(_unit(trial.applied, name).values for name in amplitudes(trial.applied)),
+            )
+            for trial in trials
+        )
+    )
+
+
 def _pushed(problem: Problem, base: Fit, trials: Sequence[Trial]) -> list[Stacked]:
     """Return the linear responses to laws in the equation of one state, a column for each amplitude."""
-    terms = [
-        (
-            trial.applied.effect,
-            tuple(_unit(trial.applied, name).values for name in amplitudes(trial.applied)),
-        )
-        for trial in trials
-    ]
-    widths = [len(starts) for _, starts in terms]
+    pattern = pattern_of(trials)
+    widths = [len(starts) for _, starts in pattern.terms]
     nothing = [{name: np.zeros((problem.rows, width)) for name in problem.names} for width in widths]
     try:
-        pushes = problem.pushed(
-            base.p, base.active, trials[0].applied, TermPattern(tuple(terms)), sum(widths)
-        )
+        pushes = problem.pushed(base.p, base.active, trials[0].applied, pattern, sum(widths))
     except FitError:
         return nothing
     ends = np.cumsum(widths).tolist()

@@ -39,6 +39,9 @@ class Shape:
     about_zero: bool = True
 
 
+_BENT = (0.05, 0.2, 0.6)  # of a signal's spread: over which a bend goes
+
+
 def _spread(x: Array) -> float:
     low, high = np.quantile(x, (0.02, 0.98))
     return float(high - low) or float(np.abs(x).max()) or 1.0
@@ -47,7 +50,11 @@ def _spread(x: Array) -> float:
 def _bends(x: Array, _: Array) -> list[dict[str, float]]:
     spread = _spread(x)
     centres = [0.0, *np.quantile(x, (0.25, 0.5, 0.75)).tolist()]
-    return [{"c": c, "s": s * spread} for c, s in itertools.product(centres, (0.05, 0.2, 0.6))]
+    return [{"c": c, "s": s * spread} for c, s in itertools.product(centres, _BENT)]
+
+
+def _limits(x: Array, _: Array) -> list[dict[str, float]]:
+    return [{"s": share * _spread(x)} for share in _BENT]
 
 
 def _bumps(x: Array, _: Array) -> list[dict[str, float]]:
@@ -132,11 +139,18 @@ TWO: tuple[Shape, ...] = (
     _static("a*{x}**2*{z}", a="{y}/({x}^2*{z})"),
     _static("a*{x}*{z}**2", a="{y}/({x}*{z}^2)"),
 )
-ALIKE: tuple[Shape, ...] = (
+EXCHANGE: tuple[Shape, ...] = (
     _static("a*({x} - {z})", about_zero=False, a="{y}/{x}"),
     _static("a*({x} - {z})*abs({x} - {z})", about_zero=False, a="{y}/{x}^2"),
+    _static("a*sign({x} - {z})*sqrt(abs({x} - {z}))", about_zero=False, a="{y}/{x}^0.5"),
 )
-"""Shapes of two signals in one unit: an exchange between them."""
+"""Shapes of how far two signals in one unit are apart: what passes between them."""
+ALIKE: tuple[Shape, ...] = (
+    *EXCHANGE,
+    _static("a*({x} - {z})**3", about_zero=False, a="{y}/{x}^3"),
+    _static("a*tanh(({x} - {z})/s)", _limits, about_zero=False, a="{y}", s="{x}"),
+)
+"""And what a spring does between them, or what follows one with the other and can do so only so fast."""
 EACH: tuple[Shape, ...] = tuple(
     shape for shape in ONE if shape.text in {"a*{x}", "a*{x}*abs({x})", "a*{x}**3"}
 )

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.diagnosis.law.ranking import all_responses, at_coefficients, at_unit_size, is_one_number
-from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, EACH, ONE, TWO, Shape, pulse
+from toolkit.diagnosis.law.shapes import ALIKE, BESIDE, EACH, EXCHANGE, ONE, TWO, Shape, pulse
 from toolkit.diagnosis.law.trial import Signal, Trial, started, trial_at
 from toolkit.diagnosis.policy import LAWS
 from toolkit.diagnosis.search.case_view import CaseView
@@ -87,7 +87,7 @@ def joint_terms_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterat
         arguments: list[tuple[Shape, dict[str, tuple[Signal, ...]]]] = [
             (shape, dict.fromkeys(pair, tuple(of_each[name] for name in pair)))
             for pair in itertools.combinations(alike, 2)
-            for shape in ALIKE
+            for shape in EXCHANGE
         ]
         if len(alike) > 1:
             listed = {name: _signals(problem, motion, name, of) for name, of in alike.items()}
@@ -97,7 +97,7 @@ def joint_terms_of(problem: Problem, base: Fit, screen: LinearisedFit) -> Iterat
                 (shape, {name: (own[0], other) for name, own in listed.items()})
                 for other in others
                 if other.unit == text
-                for shape in ALIKE
+                for shape in EXCHANGE
             ]
         for shape, places in arguments:
             trials = [

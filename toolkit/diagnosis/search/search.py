@@ -113,7 +113,7 @@ class Search:
 
     ``undecided`` are the effects that the last look of all showed, confirmed by unseen rows or not;
     ``disagreed`` is the parameter that its runs disagree about; ``kept`` tells that its effects are named,
-    whatever else stays; ``by_size`` is one of a rest that is no noise, which found no effect either.
+    whatever else stays; ``by_size`` is one of a rest that is no noise, which found no effect.
     """
 
     problem: Problem
@@ -186,7 +186,7 @@ def search(problem: Problem, *, seed: int, budget: TimeBudget) -> Search:
         halves = left < by_rows + math.log(1 - STEP.least_behind)
         simpler = halves and len(by_size.steps) <= len(found.steps)
         return by_size if simpler or not found.steps else found
-    return found if found.steps else replace(found, by_size=by_size)
+    return replace(found, by_size=by_size)
 
 
 def _searched(
