@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -120,10 +120,16 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], st
     around.anew(around.space.begin(start.p))
     simulated = {name: np.full(problem.rows, np.nan) for name in problem.names}
     for mask in folds.held:
-        trained = fit(
-            problem, active, start=start.p, rows=~mask, noise=start.noise, rounds=2, plain=start.plain,
-            derivatives=around.kept(),
-        )  # fmt: skip
+        # An effect of runs that are all held out would keep there what it has learned of them.
+        parts = _halves(problem, active, mask)
+        of_parts = [
+            fit(
+                problem, active, start=start.p, rows=~part, noise=start.noise, rounds=2, plain=start.plain,
+                derivatives=around.kept(),
+            )
+            for part in parts
+        ]  # fmt: skip
+        trained = _joined(of_parts, parts)
         fits.append(trained)
         for name in problem.names:
             simulated[name][mask] = trained.simulated[name][mask]
@@ -139,6 +145,37 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], st
         for (k, _), score in zip(unseen, of_runs, strict=True):
             scores[k] += score
     return HeldOut(scores=tuple(scores.tolist()), simulated=simulated, fits=tuple(fits))
+
+
+def _halves(
+    problem: Problem, active: Sequence[AppliedEffect], mask: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], ...]:
+    """Return the parts in which a fold is held out: two where an effect acts in no run outside of it.
+
+    In the first are all other rows of the fold and the first half of those runs, in the second their rest.
+    """
+    seen = ~mask & np.any(list(problem.kept.values()), axis=0)
+    later = np.zeros_like(mask)
+    for applied in active:
+        own = [rows for run, rows in zip(problem.runs, problem.slices, strict=True) if applied.acts_in(run)]
+        if applied.runs is None or not applied.searched or any(seen[rows].any() for rows in own):
+            continue
+        for rows in own:
+            later[(rows.start + rows.stop) // 2 : rows.stop] = True
+    later &= mask
+    return (mask & ~later, later) if later.any() and (mask & ~later).any() else (mask,)
+
+
+def _joined(fits: Sequence[Fit], parts: Sequence[NDArray[np.bool_]]) -> Fit:
+    """Return the fit of a fold: of each of its parts the simulation by what has not seen it."""
+    first, *others = fits
+    for trained, part in zip(others, parts[1:], strict=True):
+        simulated, residual = (
+            {name: np.where(part, after[name], before[name]) for name in before}
+            for before, after in ((first.simulated, trained.simulated), (first.residual, trained.residual))
+        )
+        first = replace(first, simulated=simulated, residual=residual)
+    return first
 
 
 def _unseen(
