@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace as Of
 
 import numpy as np
 import pytest
 
+from toolkit.diagnosis.answer import next_measurements as advice
 from toolkit.diagnosis.answer.locate import places
 from toolkit.diagnosis.answer.next_measurements import apart, next_measurements, to_find_it, zeros_to_read
+from toolkit.diagnosis.fit.sensor_noise import ChannelNoise
 from toolkit.diagnosis.search.unexplained import Line
 
 
@@ -203,7 +206,34 @@ def test_whoever_has_something_left_is_told_what_to_measure(rest, skipped, sente
     search.problem.names, search.problem.model, search.augmented = (), Of(outputs=()), None
     search.disagreed, search.steps = None, ()
     named = (Of(name="filter_lag", equivalent_to=()),)
-    assert list(next_measurements(search, named, "named", rest=rest, skipped=skipped)) == sentences
+    laws = Of(listed=())
+    said = next_measurements(search, named, "named", rest=rest, skipped=skipped, laws=laws)
+    assert list(said) == sentences
+
+
+@pytest.mark.parametrize(
+    ("listed", "left"), [((), "2.4e+02 N"), ((Of(),), "1.5e+02 N"), ((Of(), Of()), None)]
+)
+def test_the_noise_of_a_sensor_is_asked_for_where_laws_leave_more_than_any(monkeypatch, listed, left):
+    """A force is off by 240 N; one law leaves 150 N of it, and a second no more than noise may be."""
+    sizes = {0: 240.0, 1: 150.0}
+    search = found("time", inputs=("u",), unit="N", reason="a floor above a tenth of the output's spread")
+    search.problem.model = Of(outputs=(Of(name="FX", unit="N"),))
+    search.problem.stated_sd, search.problem.rates, search.augmented = lambda _: None, {}, 0
+    search.disagreed, search.steps, search.problem.runs = None, (), (Of(), Of())
+    monkeypatch.setattr(advice, "zeros_to_read", lambda _: [])
+
+    def beyond(_, fit):
+        rest = math.sqrt(sizes[fit] ** 2 - 16.0**2) if fit in sizes else 0.0
+        return {"FX": ChannelNoise(sensor_sd=16.0, process_sd=rest, how="differences")} if rest else {}
+
+    monkeypatch.setattr(advice, "beyond_noise", beyond)
+    laws = Of(listed=listed, fit=len(listed))
+    said = next_measurements(search, (), "unknown", rest=True, skipped=(), laws=laws)
+    asked = [text for text in said if "standard deviation" in text]
+    assert [text.split(" that are left")[0].split("how much of the ")[1] for text in asked] == (
+        [] if left is None else [left]
+    )
 
 
 @pytest.mark.parametrize(

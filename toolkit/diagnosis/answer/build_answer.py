@@ -95,7 +95,7 @@ def answer_of(case: Case, search: Search, laws: Laws, findings: tuple[Finding, .
         next_measurements=(
             *_factor_hints(search, effects),
             *_unit_hints(search, laws),
-            *next_measurements(search, effects, verdict, rest=left or unknown, skipped=skipped),
+            *next_measurements(search, effects, verdict, rest=left or unknown, skipped=skipped, laws=laws),
         ),
         findings=(
             *findings,

@@ -21,7 +21,9 @@ from toolkit.effects.catalogue import effects as catalogue
 from toolkit.units import unit, with_unit
 
 if TYPE_CHECKING:
+    from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Stacked
+    from toolkit.diagnosis.law.learn import Laws
     from toolkit.diagnosis.search.search import Search
     from toolkit.diagnosis.search.unexplained import Line
 
@@ -96,12 +98,14 @@ def next_measurements(
     *,
     rest: bool,
     skipped: tuple[str, ...],
+    laws: Laws,
 ) -> tuple[str, ...]:
     """Return a sentence for each measurement that would say more than this case does.
 
     Parameters
     ----------
     rest : something is left without a name, beside the effects or without any
+    laws : of what is left
     skipped : steps that a spent budget left out, the laws among them
     """
     sentences = [text for effect in effects if (text := parted(effect))]
@@ -115,7 +119,10 @@ def next_measurements(
     elif rest:
         sentences += to_find_it(search, subject="What is left" if effects else "The mismatch")
     if rest:
-        sentences += [*zeros_to_read(search), *_sensors(search)]
+        sentences += [
+            *zeros_to_read(search),
+            *_sensors(search, laws.fit if laws.listed else search.augmented),
+        ]
     if verdict == "unknown" or effects:
         beside = ", ".join(dict.fromkeys(step.active.effect.name for step in search.steps))
         near = f"beside {beside}" if effects else f"even beside the nearest effects ({beside})"
@@ -159,10 +166,15 @@ def zeros_to_read(search: Search) -> list[str]:
     return sentences
 
 
-def _sensors(search: Search) -> list[str]:
-    """Return that sensors' standard deviations are to be stated, where a rest may be their noise in part."""
+def _sensors(search: Search, beside: Fit) -> list[str]:
+    """Return that sensors' standard deviations are to be stated, where a rest may be their noise in part.
+
+    Parameters
+    ----------
+    beside : all that is told of the mismatch, its laws too
+    """
     problem = search.problem
-    beyond = beyond_noise(problem, search.augmented)
+    beyond = beyond_noise(problem, beside)
     sentences = []
     for output in problem.model.outputs:
         part = beyond.get(output.name)
