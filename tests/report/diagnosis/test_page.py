@@ -356,6 +356,20 @@ def test_a_residual_that_is_only_too_large_depends_on_nothing(dragged):
     assert over("F", ("v", "dv/dt")) == "F over v and dv/dt"
 
 
+@pytest.mark.parametrize(
+    ("runs", "said"),
+    [(None, "on F,"), (("r1.csv",), "on F in r1.csv alone,"), (("a", "b"), "in 2 runs alone,")],
+)
+def test_the_first_line_says_in_which_runs_an_effect_is(dragged, runs, said):
+    """The same effect in all runs and once more in one of them had two sizes there and no difference."""
+    (effect,) = dragged.diagnosis.effects
+    parameters = tuple(dataclasses.replace(each, runs=runs) for each in effect.parameters)
+    confined = dataclasses.replace(effect, parameters=parameters)
+    line = cause(dataclasses.replace(dragged.diagnosis, effects=(confined,)))
+    assert said in line
+    assert ("alone" in line) is (runs is not None)
+
+
 def test_the_first_line_has_the_cause_its_size_and_what_it_explains(dragged):
     line = cause(dragged.diagnosis)
     (effect,), (fit,) = dragged.diagnosis.effects, dragged.diagnosis.fit.held_out

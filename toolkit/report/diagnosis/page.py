@@ -170,8 +170,9 @@ def cause(diagnosis: Diagnosis) -> str | None:
             if not isinstance(parameter.value, str)
             for value, interval in (rounded(parameter.value, parameter.ci95),)
         ]
-        told = is_told_from_none(effect)
-        names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect), *sizes))))
+        told, runs = is_told_from_none(effect), effect.parameters[0].runs if effect.parameters else None
+        where = "" if runs is None else f" in {runs[0] if len(runs) == 1 else f'{len(runs)} runs'} alone"
+        names.append((not told, ("" if told else "perhaps ") + ", ".join((_name(effect) + where, *sizes))))
     explained = _explained(diagnosis)
     listed = "; ".join(name for _, name in sorted(names, key=lambda entry: entry[0]))
     listed = listed[0].upper() + listed[1:] if listed.startswith("perhaps ") else listed
