@@ -414,6 +414,7 @@ class _Laws:
     rounds: int = _set(12, "rounds", "in which each law moves to its best neighbour or halves its steps")
     fitted: int = _set(5, "laws", "fitted jointly, of those that are ranked first")
     along: int = _set(2, "laws", "of these, of those that take most of the errors from row to row")
+    in_place: int = _set(3, "laws", "fitted in the best one's place: they are ranked where it has led")
     judged: int = _set(3, "laws", "held out one after the other, the best first, until one stands")
     share: float = _set(0.1, "of the held-out mean square", "what a law takes, or it matters to nobody")
     same: float = _set(

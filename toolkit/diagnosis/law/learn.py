@@ -20,7 +20,7 @@ from toolkit.diagnosis.fit.folds import hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
 from toolkit.diagnosis.law.ranking import p_value, ranked
-from toolkit.diagnosis.law.row_to_row import shown_from_row_to_row
+from toolkit.diagnosis.law.row_to_row import shown_from_row_to_row, shown_in_place
 from toolkit.diagnosis.law.terms import joint_terms_of, pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
@@ -170,11 +170,13 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     motion = problem.model.capability.motion
     solved = motion is not None and motion.integrates
     affected = {part.output for part in structure if solved or part.is_lawful or part.is_too_large}
-    bare = solved and not base.active
     return tuple(
         name
         for name in problem.names
-        if strained or name in affected or name in problem.memory or (bare and _wanders(problem, base, name))
+        if strained
+        or name in affected
+        or name in problem.memory
+        or (solved and _wanders(problem, base, name))
     )
 
 
@@ -222,6 +224,14 @@ def _next(
     # Two equations at once are ranked with no single one: each of them is fitted.
     near += [trial for trial in joint if p_value(trial, looked) < alpha]
     fitted = _fitted(problem, base, [*along, *((trial, None) for trial in near)], weight)
+    if fitted:
+        _, best_trial, refit = fitted[0]
+        tried = {trial.place for _, trial, _ in fitted}
+        others = [trial for trial in trials if trial.place not in tried]
+        in_place = shown_in_place(problem, refit, best_trial, others, weight)[: LAWS.in_place]
+        fitted = _best_first(
+            [*fitted, *_fitted(problem, base, [(trial, refit.p) for trial in in_place], weight)]
+        )
     if fitted and (drawn := curve_trial(problem, fitted[0][1])) is not None:
         best = fitted[0][0] - base.log_posterior
         curves = [
@@ -284,6 +294,10 @@ def _fitted(
             continue
         if not any(map(at_bound, refit.active[-len(trial.together) :])):
             fitted.append((refit.log_posterior - weight * trial.cost, trial, refit))
+    return _best_first(fitted)
+
+
+def _best_first(fitted: Sequence[tuple[float, Trial, Fit]]) -> list[tuple[float, Trial, Fit]]:
     return sorted(fitted, key=lambda entry: -entry[0])
 
 

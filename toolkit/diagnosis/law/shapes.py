@@ -39,6 +39,7 @@ class Shape:
     about_zero: bool = True
 
 
+_BEND_AT = (0.15, 0.3, 0.5, 0.7, 0.85)  # of a signal's rows
 _BENT = (0.05, 0.2, 0.6)  # of a signal's spread: over which a bend goes
 
 
@@ -63,7 +64,11 @@ def _bumps(x: Array, _: Array) -> list[dict[str, float]]:
 
 
 def _thresholds(x: Array, _: Array) -> list[dict[str, float]]:
-    return [{"c": c} for c in np.quantile(x, (0.15, 0.3, 0.5, 0.7, 0.85)).tolist()]
+    return [{"c": c} for c in np.quantile(x, _BEND_AT).tolist()]
+
+
+def _widths(x: Array, _: Array) -> list[dict[str, float]]:
+    return [{"w": w} for w in np.quantile(np.abs(x), _BEND_AT).tolist() if w > 0]
 
 
 def _growths(x: Array, _: Array) -> list[dict[str, float]]:
@@ -131,6 +136,8 @@ ONE: tuple[Shape, ...] = (
     ),
     _static("a*max({x} - c, 0)", _thresholds, a="{y}/{x}", c="{x}"),
     _static("a*min({x} - c, 0)", _thresholds, a="{y}/{x}", c="{x}"),
+    # What is beyond a limit, or outside of a dead zone, to either side.
+    _static("a*(max({x} - w, 0) + min({x} + w, 0))", _widths, a="{y}/{x}", w="{x}"),
 )  # fmt: skip
 TWO: tuple[Shape, ...] = (
     _static("a*{x}*{z}", a="{y}/({x}*{z})"),
