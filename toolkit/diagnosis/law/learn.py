@@ -141,7 +141,7 @@ def learned_by_size(search: Search, laws: Laws, budget: TimeBudget) -> tuple[Sea
         return search, laws
     others = learned(by_size, withdrawn=False, budget=budget)
     by_rows, left = (unseen_error(problem, each.held_out) for each in (laws, others))
-    better = not laws.listed or left < by_rows + math.log(STEP.least_behind)
+    better = left < by_rows + math.log(STEP.least_behind if laws.listed else 1 - LAWS.share)
     return (by_size, others) if others.listed and better else (search, laws)
 
 
@@ -163,8 +163,8 @@ def _outputs(problem: Problem, base: Fit, structure: Sequence[StructureFound]) -
     """Return the outputs that ask for a law: all of them where a parameter has absorbed what was left out.
 
     Of an equation runs that differ ask as well: an input that came once moves its run as long as it rings.
-    So does a rest that is known to be no noise, and in an equation, where nothing is named, one that is more
-    than the sensor's noise: what rings is coloured.
+    So does a rest that is known to be no noise, and in an equation one that is more than the sensor's noise:
+    what rings is coloured.
     """
     strained = any(abs(off) > PRIORS.far for off in problem.off_priors(base.p))
     motion = problem.model.capability.motion
