@@ -14,7 +14,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from toolkit.effects.filters import lag, play
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
     from toolkit.arrays import Array
 
     Part = Callable[[Mapping[str, Any], Mapping[str, float], Any], Any]
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 _LONGEST = 2_000  # characters: a formula that a person reads has fewer than a hundred
 _LARGEST_POWER = 9
 _SHORTEST = 1e-12  # of a lag [s]
+_CURVES = 3  # beside the last, whose pieces are kept
 _SIGNAL = re.compile(r"\[([^\[\]]+)\]")
 _INSIDE = "__"  # what stands for a bracket while Python's parser reads the rest; no parameter begins so
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -46,24 +49,45 @@ def _between(x: Array, low: float, high: float) -> Array:
     return np.asarray((x >= low) & (x <= high), dtype=np.float64)
 
 
-def _spline(x: Any, *points: float) -> Any:
+def _spline(x: Any, *points: Any) -> Any:
     """Return a natural cubic spline through (x1, y1, x2, y2, ...), constant beyond its ends.
 
     Nothing was recorded there, and a curve that goes on rising can drive an equation out of all bounds.
     """
+    inside, heights = np.clip(x, points[0], points[-2]), points[1::2]
+    if not any(np.ndim(height) for height in heights):
+        return _curve(tuple(map(float, points)))(inside)
+    # Columns of several sets of parameters: a curve for each. As a piece of a curve is evaluated by itself.
+    knots = np.array(points[0::2], dtype=np.float64)
+    pieces = _pieces(knots, heights)
+    inside, column = np.broadcast_arrays(inside, np.arange(pieces.shape[2]))
+    at = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    off, piece = inside - knots[at], pieces[:, at, column]
+    square = off * off
+    return piece[3] + piece[2] * off + piece[1] * square + piece[0] * (square * off)
+
+
+@lru_cache(maxsize=8)
+def _curve(points: tuple[float, ...]) -> CubicSpline:
     from scipy.interpolate import CubicSpline
 
-    inside = np.clip(x, points[0], points[-2])
-    heights = np.stack(np.broadcast_arrays(*points[1::2]))
-    if heights.ndim == 1:
-        return CubicSpline(points[0::2], heights, bc_type="natural")(inside)
-    # Columns of several sets of parameters: a curve for each of the sets.
-    sets, of = np.unique(heights, axis=1, return_inverse=True)
-    inside, of = np.broadcast_arrays(inside, of.ravel())
-    values = np.empty(inside.shape)
-    for k in range(sets.shape[1]):
-        values[of == k] = CubicSpline(points[0::2], sets[:, k], bc_type="natural")(inside[of == k])
-    return values
+    return CubicSpline(points[0::2], points[1::2], bc_type="natural")
+
+
+_last: list[tuple[Array, tuple[Any, ...], Array]] = []  # curves of columns: an equation asks at every step
+
+
+def _pieces(knots: Array, heights: tuple[Any, ...]) -> Array:
+    """Return the coefficients of curves, (4, pieces, columns), known of the very same arrays."""
+    from scipy.interpolate import CubicSpline
+
+    for known, through, pieces in _last:
+        if np.array_equal(known, knots) and all(map(operator.is_, through, heights)):
+            return pieces
+    stacked = np.stack(np.broadcast_arrays(*heights))
+    pieces = np.asarray(CubicSpline(knots, stacked, bc_type="natural").c)
+    _last[:] = [(knots, heights, pieces), *_last[:_CURVES]]
+    return pieces
 
 
 def _pulse(x: Any, start: Any, end: Any, edge: Any) -> Any:
