@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import kept_of_the_same
 from toolkit.effects.filters import lag, play
 from toolkit.errors import ConfigError
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 _LONGEST = 2_000  # characters: a formula that a person reads has fewer than a hundred
 _LARGEST_POWER = 9
 _SHORTEST = 1e-12  # of a lag [s]
-_CURVES = 3  # beside the last, whose pieces are kept
 _SIGNAL = re.compile(r"\[([^\[\]]+)\]")
 _INSIDE = "__"  # what stands for a bracket while Python's parser reads the rest; no parameter begins so
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -54,12 +54,11 @@ def _spline(x: Any, *points: Any) -> Any:
 
     Nothing was recorded there, and a curve that goes on rising can drive an equation out of all bounds.
     """
-    inside, heights = np.clip(x, points[0], points[-2]), points[1::2]
-    if not any(np.ndim(height) for height in heights):
+    inside = np.clip(x, points[0], points[-2])
+    if not any(map(np.ndim, points[1::2])):
         return _curve(tuple(map(float, points)))(inside)
     # Columns of several sets of parameters: a curve for each. As a piece of a curve is evaluated by itself.
-    knots = np.array(points[0::2], dtype=np.float64)
-    pieces = _pieces(knots, heights)
+    knots, pieces = _pieces(*points)
     inside, column = np.broadcast_arrays(inside, np.arange(pieces.shape[2]))
     at = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
     off, piece = inside - knots[at], pieces[:, at, column]
@@ -74,20 +73,14 @@ def _curve(points: tuple[float, ...]) -> CubicSpline:
     return CubicSpline(points[0::2], points[1::2], bc_type="natural")
 
 
-_last: list[tuple[Array, tuple[Any, ...], Array]] = []  # curves of columns: an equation asks at every step
-
-
-def _pieces(knots: Array, heights: tuple[Any, ...]) -> Array:
-    """Return the coefficients of curves, (4, pieces, columns), known of the very same arrays."""
+@kept_of_the_same(4)  # an equation asks at every step
+def _pieces(*points: Any) -> tuple[Array, Array]:
+    """Return the knots of curves and their coefficients, (4, pieces, columns)."""
     from scipy.interpolate import CubicSpline
 
-    for known, through, pieces in _last:
-        if np.array_equal(known, knots) and all(map(operator.is_, through, heights)):
-            return pieces
-    stacked = np.stack(np.broadcast_arrays(*heights))
-    pieces = np.asarray(CubicSpline(knots, stacked, bc_type="natural").c)
-    _last[:] = [(knots, heights, pieces), *_last[:_CURVES]]
-    return pieces
+    heights = np.stack(np.broadcast_arrays(*points[1::2]))
+    drawn = CubicSpline(points[0::2], heights, bc_type="natural")
+    return np.asarray(drawn.x), np.asarray(drawn.c)
 
 
 def _pulse(x: Any, start: Any, end: Any, edge: Any) -> Any:
