@@ -85,7 +85,7 @@ def integrate(
         x, k, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, k, absolute, step, slides)
         there = x[:, None]
         if at < t[i + 1]:
-            rows = t[i + 1 : i + 1 + (1 if slides else min(2**in_turn, _STRETCH))]
+            rows = t[i + 1 : i + 1 + min(2**in_turn, _STRETCH)]
             there = _stiff(rate, at, rows, x, atol)
             x, in_turn = there[:, -1], in_turn + 1
             k = rate(float(rows[-1]), x).tolist()
@@ -240,7 +240,7 @@ def _stiff(rate: Rate, t: float, rows: Array, x: Array, atol: Array) -> Array:
         if calls_left < 0:
             raise IntegrationError(f"no end is reached near {at:g} s")
         rates = rate(at, state)
-        if bad is None and not np.isfinite(rates).all() and np.isfinite(state).all():
+        if bad is None and not all(map(math.isfinite, rates.tolist())) and np.isfinite(state).all():
             bad = at, state.copy(), rates
         return rates
 
