@@ -1,8 +1,10 @@
 """Integration from row to row: Dormand and Prince's pair with error control, LSODA where it turns stiff.
 
 Inputs are linear between rows, so that the equation is smooth within an interval and has a kink at each row:
-steps end on rows, and no step ever looks across one. The rate itself has no jump there: that of a step's end
-is that of the next one's beginning.
+steps end on rows, and none looks across one. The rate itself has no jump there: that of a step's end is that
+of the next one's beginning. Where one interval is stiff, those behind it are, and to find that out takes the
+most steps: LSODA leads on over more and more of them, in steps no longer than a row, before the pair is tried
+again.
 
 Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
 """
@@ -78,9 +80,7 @@ def integrate(
         raise IntegrationError(wrong_rates(rates, start.size))
     _check_numbers(float(t[0]), start, rates)
     absolute, k = atol.tolist(), rates.tolist()
-    i = in_turn = (
-        0  # stiff stretches in turn: where one was, the next rows are, and to find that out costs most
-    )
+    i = in_turn = 0  # row, and stiff stretches in turn
     while i < len(t) - 1:
         x, k, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, k, absolute, step, slides)
         there = x[:, None]
