@@ -73,7 +73,25 @@ def test_splines_of_several_sets_are_those_of_each_set_alone():
     of = np.array([0, 1, 1, 0])
     values = {name: np.array([sets[k][name] for k in of]) for name in sets[0]}
     alone = [float(curve({"x": at}, sets[k])) for at, k in zip(x, of, strict=True)]
-    np.testing.assert_allclose(curve({"x": x}, values), alone, rtol=1e-12)
+    np.testing.assert_array_equal(curve({"x": x}, values), alone)
+
+
+def test_a_curve_that_an_equation_asks_at_every_step_is_drawn_once(monkeypatch):
+    import scipy.interpolate
+
+    drawn, spline = [], scipy.interpolate.CubicSpline
+    monkeypatch.setattr(
+        scipy.interpolate, "CubicSpline", lambda *given, **how: drawn.append(1) or spline(*given, **how)
+    )
+    curve, x = formula("spline([x], 0, a1, 1, a2, 2, a3)"), np.array([0.2, 0.7, 1.6, 1.1])
+    one = {"a1": 0.11, "a2": 0.22, "a3": 0.33}
+    several = {name: np.full(4, value) for name, value in one.items()}
+    for values in (one, several):
+        first = curve({"x": x}, values)
+        np.testing.assert_array_equal(curve({"x": x}, values), first)
+    assert len(drawn) == 2
+    several["a2"] = several["a2"] + 1.0
+    assert curve({"x": x}, several)[1] > first[1]
 
 
 def test_a_pulse_is_there_between_its_ends_and_half_at_them():

@@ -115,7 +115,7 @@ def test_a_page_of_another_port_reads_and_decides_nothing(
             pass
 
     opened(browser, own, [], []).close()
-    server = http.server.HTTPServer(("127.0.0.1", 0), Hostile)
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Hostile)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     page = browser.new_page()
     page.goto(f"http://127.0.0.1:{server.server_port}/")

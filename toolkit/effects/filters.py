@@ -54,10 +54,11 @@ def lag(t: Array, x: Array, time_constant: ArrayLike, start: float | None = None
 
         y[1:] = lfilter([1.0], [1.0, -decay[0]], drive, zi=[decay[0] * y[0]])[0]
         return y
-    last = float(y[0])
-    for i, (keep, add) in enumerate(zip(decay.tolist(), drive.tolist(), strict=True), start=1):
+    last, ahead = float(y[0]), []
+    for keep, add in zip(decay.tolist(), drive.tolist(), strict=True):
         last = keep * last + add
-        y[i] = last
+        ahead.append(last)
+    y[1:] = ahead
     return y
 
 
@@ -117,12 +118,11 @@ def play(x: Array, width: float, past: float = 0.0) -> Array:
     It starts in the middle of the gap, or off it by the share ``past`` of half the gap.
     """
     half = 0.5 * abs(width)
-    y = np.empty_like(x)
-    last = float(x[0]) + past * half if len(x) else 0.0
-    for i, value in enumerate(x.tolist()):
-        last = min(max(last, value - half), value + half)
-        y[i] = last
-    return y
+    last, played = float(x[0]) + past * half if len(x) else 0.0, []
+    for low, high in zip((x - half).tolist(), (x + half).tolist(), strict=True):
+        last = low if last < low else high if last > high else last
+        played.append(last)
+    return np.array(played, dtype=np.float64)
 
 
 def plays(x: Array, halves: Array, past: float = 0.0) -> Array:

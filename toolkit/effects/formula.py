@@ -14,15 +14,18 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import kept_of_the_same
 from toolkit.effects.filters import lag, play
 from toolkit.errors import ConfigError
 
 if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
     from toolkit.arrays import Array
 
     Part = Callable[[Mapping[str, Any], Mapping[str, float], Any], Any]
@@ -46,24 +49,38 @@ def _between(x: Array, low: float, high: float) -> Array:
     return np.asarray((x >= low) & (x <= high), dtype=np.float64)
 
 
-def _spline(x: Any, *points: float) -> Any:
+def _spline(x: Any, *points: Any) -> Any:
     """Return a natural cubic spline through (x1, y1, x2, y2, ...), constant beyond its ends.
 
     Nothing was recorded there, and a curve that goes on rising can drive an equation out of all bounds.
     """
+    inside = np.clip(x, points[0], points[-2])
+    if not any(map(np.ndim, points[1::2])):
+        return _curve(tuple(map(float, points)))(inside)
+    # Columns of several sets of parameters: a curve for each. As a piece of a curve is evaluated by itself.
+    knots, pieces = _pieces(*points)
+    inside, column = np.broadcast_arrays(inside, np.arange(pieces.shape[2]))
+    at = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    off, piece = inside - knots[at], pieces[:, at, column]
+    square = off * off
+    return piece[3] + piece[2] * off + piece[1] * square + piece[0] * (square * off)
+
+
+@lru_cache(maxsize=8)
+def _curve(points: tuple[float, ...]) -> CubicSpline:
     from scipy.interpolate import CubicSpline
 
-    inside = np.clip(x, points[0], points[-2])
+    return CubicSpline(points[0::2], points[1::2], bc_type="natural")
+
+
+@kept_of_the_same(4)  # an equation asks at every step
+def _pieces(*points: Any) -> tuple[Array, Array]:
+    """Return the knots of curves and their coefficients, (4, pieces, columns)."""
+    from scipy.interpolate import CubicSpline
+
     heights = np.stack(np.broadcast_arrays(*points[1::2]))
-    if heights.ndim == 1:
-        return CubicSpline(points[0::2], heights, bc_type="natural")(inside)
-    # Columns of several sets of parameters: a curve for each of the sets.
-    sets, of = np.unique(heights, axis=1, return_inverse=True)
-    inside, of = np.broadcast_arrays(inside, of.ravel())
-    values = np.empty(inside.shape)
-    for k in range(sets.shape[1]):
-        values[of == k] = CubicSpline(points[0::2], sets[:, k], bc_type="natural")(inside[of == k])
-    return values
+    drawn = CubicSpline(points[0::2], heights, bc_type="natural")
+    return np.asarray(drawn.x), np.asarray(drawn.c)
 
 
 def _pulse(x: Any, start: Any, end: Any, edge: Any) -> Any:

@@ -27,6 +27,21 @@ def test_a_stiff_equation_is_handed_on_and_still_right():
     np.testing.assert_allclose(made[0, 5:], exact[5:], atol=1e-4)
 
 
+@pytest.mark.parametrize("short", [1e-5, 1e-7, 1e-9])
+def test_where_one_row_is_stiff_the_next_are_not_tried_one_by_one(short):
+    """A lag far shorter than a row follows its input, whose corners stand on the rows."""
+    t, asked = np.linspace(0, 5, 501), []
+    wave = np.interp(t, [0, 1, 3, 5], [0.0, 1.0, -1.0, 1.0])
+
+    def rate(at, x):
+        asked.append(at)
+        return np.array([(np.interp(at, t, wave) - x[0]) / short])
+
+    made = integrate(rate, t, np.array([0.0]), np.full(1, 1e-7))
+    np.testing.assert_allclose(made[0, 1:], (wave - short * np.gradient(wave, t))[1:], atol=short + 1e-5)
+    assert len(asked) < 60 * len(t)  # row by row it was 450 of each
+
+
 def test_a_ramp_input_is_integrated_to_its_kink():
     t = np.array([0.0, 1.0, 2.0])
     made = integrate(lambda at, _: np.array([1 - abs(at - 1)]), t, np.array([0.0]), np.full(1, TIGHT))

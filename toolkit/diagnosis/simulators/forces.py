@@ -40,8 +40,8 @@ class Force:
     the equation is it; ``scale`` is the size of the velocity state (of the state itself, where it has no
     position). ``reads`` are the signals of a law by name, with the place of those that are states; ``feeds``
     is the state to which a part of what is held back may come; ``dry`` are size and reach of a bristle.
-    ``memory`` is the place of the first of the states by which its law remembers, ``followed`` the size of
-    what it reads.
+    ``memory`` is the place of the first of the states by which its law remembers, ``remembered`` what it does
+    and where that stands among the added states, ``followed`` the size of what it reads.
     """
 
     velocity: int
@@ -54,21 +54,13 @@ class Force:
     feeds: int | None = None
     dry: tuple[Any, Any] | None = None
     memory: int | None = None
+    remembered: tuple[tuple[Remembered, slice], ...] = ()
     followed: float = 1.0
 
     @property
     def place(self) -> tuple[object, ...]:
         """What tells forces apart that are not of one kind at one place."""
         return self.velocity, self.position, self.bristle, self.way, self.memory, self.active.key
-
-    @property
-    def remembered(self) -> tuple[tuple[Remembered, slice], ...]:
-        """What its law remembers, and where that stands among the added states."""
-        parts, at = [], self.memory or 0
-        for part in _remembered(self.active):
-            parts.append((part, slice(at, at + part.states)))
-            at += part.states
-        return tuple(parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +96,10 @@ class Forces:
                 if at not in derivative_of:
                     way, added = added, added + 1
             reads = _reads(one, states, at, derivative_of.get(at, at), inputs)
-            if remembered := _remembered(one):
-                memory, added = added, added + sum(part.states for part in remembered)
+            remembered: list[tuple[Remembered, slice]] = []
+            for part in _remembered(one):
+                remembered.append((part, slice(added, added + part.states)))
+                memory, added = remembered[0][1].start, added + part.states
             made.append(
                 Force(
                     velocity=at,
@@ -118,6 +112,7 @@ class Forces:
                     feeds=(feeds or {}).get(at),
                     dry=dry if bristle is not None else None,
                     memory=memory,
+                    remembered=tuple(remembered),
                     followed=_followed(reads, states, scale),
                 )
             )
@@ -315,10 +310,15 @@ class Acting:
         seen : the inputs and the time, each (columns,)
         """
         for force, at in self._listed:
-            part = rate[:, at]
+            if isinstance(at, slice):
+                _add(force, x, rate, self._own, seen)
+                continue
+            # Row by row, and by `take`: a tenth of the time that an index over both takes.
+            part = rate.take(at, axis=1)
             there = {name: seen[name][at] for name, place in force.reads if place is None}
-            _add(force, x[:, at], part, self._own, there)
-            rate[:, at] = part
+            _add(force, x.take(at, axis=1), part, self._own, there)
+            for row, values in zip(rate, part, strict=True):
+                row[at] = values
 
 
 def _of(force: Force, values: Mapping[str, Array], sets: Places) -> Force:

@@ -1,8 +1,10 @@
 """Integration from row to row: Dormand and Prince's pair with error control, LSODA where it turns stiff.
 
 Inputs are linear between rows, so that the equation is smooth within an interval and has a kink at each row:
-steps end on rows, and no step ever looks across one. The rate itself has no jump there: that of a step's end
-is that of the next one's beginning.
+steps end on rows, and none looks across one. The rate itself has no jump there: that of a step's end is that
+of the next one's beginning. Where one interval is stiff, those behind it are, and to find that out takes the
+most steps: LSODA leads on over more and more of them, in steps no longer than a row, before the pair is tried
+again.
 
 Source: Dormand, Prince, J. Comp. Appl. Math. 6 (1980) 19.
 """
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 RTOL = 1e-6
 _MOST = 20_000  # rates that the stiff solver may ask for between two rows
 OFF = 1e100  # in no unit is a state of any plant as large
+_STRETCH = 16  # rows at most that the stiff solver leads over, before the other is tried again
 _HUGE = 1e300
 SLOW = 100.0  # tolerances of a velocity, by which a body is at its turn
 MANY = 60  # steps within one interval: the equation is stiff there
@@ -77,14 +80,22 @@ def integrate(
         raise IntegrationError(wrong_rates(rates, start.size))
     _check_numbers(float(t[0]), start, rates)
     absolute, k = atol.tolist(), rates.tolist()
-    for i in range(len(t) - 1):
+    i = in_turn = 0  # row, and stiff stretches in turn
+    while i < len(t) - 1:
         x, k, step, at = _advance(rate, float(t[i]), float(t[i + 1]), x, k, absolute, step, slides)
+        there = x[:, None]
         if at < t[i + 1]:
-            x = _stiff(rate, at, float(t[i + 1]), x, atol)
-            k = rate(float(t[i + 1]), x).tolist()
-        if not (np.abs(x) < OFF).all():
-            raise IntegrationError(f"the state has run off at {t[i + 1]:g} s")
-        solution[:, i + 1] = x
+            rows = t[i + 1 : i + 1 + min(2**in_turn, _STRETCH)]
+            there = _stiff(rate, at, rows, x, atol)
+            x, in_turn = there[:, -1], in_turn + 1
+            k = rate(float(rows[-1]), x).tolist()
+        else:
+            in_turn = 0
+        off = ~(np.abs(there) < OFF).all(axis=0)
+        if off.any():
+            raise IntegrationError(f"the state has run off at {t[i + 1 + int(np.argmax(off))]:g} s")
+        solution[:, i + 1 : i + 1 + there.shape[1]] = there
+        i += there.shape[1]
     return solution
 
 
@@ -215,10 +226,11 @@ def _check_numbers(t: float, x: Array, rates: Array) -> None:
         raise IntegrationError(f"rhs gives {rates[bad]} for state {bad + 1} at t = {t:g} s, x = [{state}]")
 
 
-def _stiff(rate: Rate, t: float, end: float, x: Array, atol: Array) -> Array:
+def _stiff(rate: Rate, t: float, rows: Array, x: Array, atol: Array) -> Array:
+    """Return the states at the next rows, (states, rows). No step is longer than from one row to the next."""
     from scipy.integrate import solve_ivp
 
-    calls_left = _MOST
+    calls_left, end = _MOST * len(rows), float(rows[-1])
     bad: tuple[float, Array, Array] | None = None
 
     def counted(at: float, state: Array) -> Array:
@@ -228,15 +240,18 @@ def _stiff(rate: Rate, t: float, end: float, x: Array, atol: Array) -> Array:
         if calls_left < 0:
             raise IntegrationError(f"no end is reached near {at:g} s")
         rates = rate(at, state)
-        if bad is None and not np.isfinite(rates).all() and np.isfinite(state).all():
+        if bad is None and not all(map(math.isfinite, rates.tolist())) and np.isfinite(state).all():
             bad = at, state.copy(), rates
         return rates
 
-    solved = solve_ivp(counted, (t, end), x, method="LSODA", rtol=RTOL, atol=atol)
+    longest = float(np.diff(rows).max()) if len(rows) > 1 else math.inf
+    solved = solve_ivp(
+        counted, (t, end), x, method="LSODA", t_eval=rows, rtol=RTOL, atol=atol, max_step=longest
+    )
     if not solved.success or not np.isfinite(solved.y[:, -1]).all():
         if bad is not None:
             _check_numbers(*bad)
         raise IntegrationError(
             str(solved.message) if not solved.success else f"the state is no number at {end:g} s"
         )
-    return np.asarray(solved.y[:, -1], dtype=np.float64)
+    return np.asarray(solved.y, dtype=np.float64)

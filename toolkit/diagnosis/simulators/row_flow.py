@@ -114,12 +114,14 @@ class RowFlow:
         rows, key = self.rows, sets.tobytes()
         if key not in self._single:
             self._single[key] = self._stretch(np.delete(np.arange(len(rows.t) - 1), rows.last[:-1]), sets)
+        stretch = self._single[key]
+        if len(rows.last) == 1:
+            end, error = _led(x[:, :, :-1], stretch, 1)
+            return end.reshape(x[:, :, 1:].shape), error.reshape(len(sets), -1)
         ends, errors = x[:, :, 1:].copy(), np.zeros((x.shape[1], x.shape[2] - 1))
-        at: slice | Places = self._single[key].at if len(rows.last) > 1 else slice(0, -1)
-        end, error = _led(x[:, :, at].reshape(len(x), -1), self._single[key], 1)
-        at = slice(None) if len(rows.last) == 1 else at
-        ends[:, :, at] = end.reshape(len(x), len(sets), -1)
-        errors[:, at] = error.reshape(len(sets), -1)
+        end, error = _led(x.take(stretch.at, axis=2), stretch, 1)
+        _put(ends, stretch.at, end)
+        _put(errors, stretch.at, error)
         return ends, errors
 
     def __call__(self, x: Array, steps: Places, sets: Places) -> tuple[Array, Array]:
@@ -140,15 +142,15 @@ class RowFlow:
         flows[self.rows.last[:-1]] = False
         for count in np.unique(steps[flows]).tolist():
             at = np.flatnonzero(flows & (steps == count))
-            end, error = _led(x[:, :, at].reshape(len(x), -1), self._stretch(at, sets), count)
-            ends[:, :, at] = end.reshape(len(x), len(sets), -1)
-            errors[:, at] = error.reshape(len(sets), -1)
+            end, error = _led(x.take(at, axis=2), self._stretch(at, sets), count)
+            _put(ends, at, end)
+            _put(errors, at, error)
         return ends, errors
 
     def columns(self, places: Places, sets: Places) -> Columns:
         """Return what does not change along columns: row and set of each, (m,), the row for its run."""
         p = {name: values[sets] for name, values in self._p.items()}
-        return Columns(p, self._forces.on(sets, self.rows.run[places]), self.atol[:, sets])
+        return Columns(p, self._forces.on(sets, self.rows.run[places]), self.atol.take(sets, axis=1))
 
     def equation(self, places: Places, columns: Columns) -> Rates:
         """Return (share of the way to the next row, states) -> rates; the share is a number or (m,).
@@ -189,8 +191,21 @@ class _Stretch:
     length: Array
 
 
-def _led(y: Array, on: _Stretch, count: int) -> tuple[Array, Array]:
-    """Return states and errors after ``count`` steps to the next rows."""
+def _put(whole: Array, at: Places, part: Array) -> None:
+    """Put rows into the last axis, in place: line by line takes a tenth of the time of an index over all."""
+    lines = whole.reshape(-1, whole.shape[-1])
+    for line, values in zip(lines, part.reshape(len(lines), -1), strict=True):
+        line[at] = values
+
+
+def _led(x: Array, on: _Stretch, count: int) -> tuple[Array, Array]:
+    """Return states and errors after ``count`` steps to the next rows, a column for each set and row.
+
+    Parameters
+    ----------
+    x : states at the rows of the stretch, (states, sets, rows)
+    """
+    y = x.reshape(len(x), -1)
     rates, bristles, atol = on.rates, on.columns.acting.bristles, on.columns.atol
     h, worst, first = on.length / count, np.zeros(y.shape[1]), rates(0.0, y)
     for i in range(count):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from toolkit.arrays import kept_of_the_same
 from toolkit.effects.effect import ANY_OTHER, Effect, EffectParameter
 from toolkit.effects.facts import Term, Values
 from toolkit.effects.filters import PAST
@@ -32,8 +33,7 @@ def _recorded(t: Array, velocity: Array, values: Values) -> Array:
     reach = max(values["presliding"], 0.0)
     if len(t) < 2:
         return values["coulomb"] * np.sign(velocity)
-    knots, travelled, strokes = _path(t, velocity)
-    sizes = np.diff(travelled)
+    knots, sizes, strokes = _path(t, velocity)
     # Bent by the way before the first row, which is not recorded: as if it had gone on as it begins.
     start = float(np.sign(velocity[0])) + 2 * values.get(PAST, 0.0)
     z, bent = _bristle(sizes, strokes, reach, start=start)
@@ -47,10 +47,11 @@ def _recorded(t: Array, velocity: Array, values: Values) -> Array:
     return np.asarray(values["coulomb"] * means)
 
 
+@kept_of_the_same(64)  # a run's velocity is asked for with every size of the friction
 def _path(t: Array, velocity: Array) -> tuple[Array, Array, Array]:
-    """Return instants between which the way does not turn, the distance by then, and each piece's way.
+    """Return instants between which the way does not turn, and each piece's length and direction.
 
-    The rows, the quarters between them, and the reversals: shapes (k,), (k,), (k - 1,).
+    The rows, the quarters between them, and the reversals: shapes (k,), (k - 1,), (k - 1,).
     """
     turns = velocity[:-1] * velocity[1:] < 0
     share = velocity[:-1][turns] / (velocity[:-1][turns] - velocity[1:][turns])
@@ -62,18 +63,18 @@ def _path(t: Array, velocity: Array) -> tuple[Array, Array, Array]:
     order = np.argsort(knots, kind="stable")
     knots, speeds = knots[order], speeds[order]
     moved = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(knots)
-    return knots, np.concatenate([[0.0], np.cumsum(np.abs(moved))]), np.sign(moved)
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(moved))])
+    return knots, np.diff(travelled), np.sign(moved)
 
 
 def _bristle(sizes: Array, strokes: Array, reach: float, *, start: float) -> tuple[Array, Array]:
     """Return the bristle at the beginning and at the end of each piece."""
     shares = np.exp(-sizes / reach) if reach > 0 else (sizes <= 0).astype(float)
-    before, after = np.empty_like(sizes), np.empty_like(sizes)
-    last = start
-    for i, (share, stroke) in enumerate(zip(shares.tolist(), strokes.tolist(), strict=True)):
-        before[i] = last
-        last = after[i] = stroke + (last - stroke) * share
-    return before, after
+    bends = [last := start]
+    for share, stroke in zip(shares.tolist(), strokes.tolist(), strict=True):
+        last = stroke + (last - stroke) * share
+        bends.append(last)
+    return np.array(bends[:-1]), np.array(bends[1:])
 
 
 def _bristle_of(values: Values) -> tuple[Any, Any]:
