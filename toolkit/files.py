@@ -290,6 +290,16 @@ def reads_as_number(text: str) -> bool:
     return True
 
 
+def number_of(text: str) -> float | None:
+    """Return the number of a word that somebody typed; None where it is none that can be computed with.
+
+    >>> number_of(" -1e3 "), number_of("1e300"), number_of("nan"), number_of("1,5")
+    (-1000.0, None, None, None)
+    """
+    value = float(text) if reads_as_number(text) else None
+    return value if is_number(value) else None
+
+
 def number_expected(actual: object, expected: str) -> str:
     """Return what is expected in place of a value: where it is a number out of reach, the reach.
 

@@ -176,6 +176,20 @@ def test_a_constant_below_the_rounding_has_no_sign():
     assert judged(columns((*FY[:3], 0.0), (*MZ[:3], 0.0)), (tared,), in_force=tared).grade == "exact"
 
 
+def test_a_constant_whose_sign_the_issued_digits_hide_has_none():
+    # At 400 lbf the digits that the certificate leaves out are as much as the constant's two signs differ by.
+    issued = (*FY[:3], 1e-3), (*MZ[:3], 0.0)
+    full = record("m15-r8", (FY[0] + 5e-6, *FY[1:3], 1e-3), issued[1], issued=issued)
+    x = seven_digits(np.random.default_rng(1).uniform(380.0, 420.0, (60, 3)))
+    y = {load: seven_digits(x @ np.array(c[:3]) + c[3]) for load, c in zip(("FY", "MZ"), issued, strict=True)}
+    found = judged(from_arrays(x, y), (full,), in_force=full)
+    assert (found.grade, found.record, found.candidates) == ("exact", "m15-r8", ())
+    # Where the file can tell, the sign is told.
+    y["FY"] = seven_digits(x @ np.array(FY[:3]) - 5e-3)
+    bold = record("m15-r9", (*FY[:3], 5e-3), issued[1])
+    assert judged(from_arrays(x, y), (bold,), in_force=bold).variant == "constant negative in FY"
+
+
 def test_a_change_in_the_middle_gives_two_segments():
     found = judged(joined(columns(rows=40), columns(negative(FY), negative(MZ), rows=25, seed=5)))
     assert [(s.first_row, s.last_row, s.record, s.grade) for s in found.segments] == [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,26 @@ def test_a_list_links_by_test_by_path_and_by_hash(made, archive, tmp_path):
     assert told["R 2"]["tests"] == ["2018/tire A"]
     assert (told["R 3"]["tests"], told["R 3"]["files"], told["R 3"]["not_clean"]) == ([], 1, 1)  # undated
     assert told["R 4"]["linked_by"] == []
+
+
+def test_a_copy_of_a_recording_in_another_test_does_not_make_the_report_rest_on_that(archive, tmp_path):
+    shutil.copytree(archive, tmp_path / "archive")
+    first = tmp_path / "archive" / "2018/tire A"
+    write(first / "two.xlsx", recording(seed=31))
+    shutil.copy(first / "one.xlsx", tmp_path / "archive" / "2019/tire A" / "copy.xlsx")
+    shutil.copy(first / "one.xlsx", tmp_path / "archive" / "copy of no test.xlsx")
+    hashes = [sha256_file(first / name) for name in ("one.xlsx", "two.xlsx")]
+    (tmp_path / "list.csv").write_text("report,sha256\n" + "".join(f"R,{sha}\n" for sha in hashes))
+    made = audit_archive(tmp_path / "archive", Registry(CALIBRATIONS), known_at=dt.date(2026, 1, 1))
+    told = by_name(link(made, read_reports(tmp_path / "list.csv", [])))
+    assert (told["R"]["tests"], told["R"]["files"]) == (["2018/tire A"], 2)
+
+
+def test_a_name_that_tests_of_two_years_have_is_told(made, tmp_path):
+    (tmp_path / "list.csv").write_text("report,test\nR 1,tire A\nR 2,2018/tire A\n")
+    told = by_name(link(made, read_reports(tmp_path / "list.csv", [])))
+    assert (told["R 1"]["tests"], told["R 1"]["alike"]) == (["2018/tire A", "2019/tire A"], 2)
+    assert (told["R 2"]["tests"], "alike" in told["R 2"]) == (["2018/tire A"], False)
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,7 @@ def test_the_picture(tmp_path: Path, name: str) -> None:
         ("--load", "FY", "--indications", "D51=1,D51=1,D52=1,E5=1"),
         ("--load", "FY", "--indications", "D51=x"),
         ("--load", "FY", "--indications", "D51=nan,D52=1,E5=1"),
+        ("--load", "FY", "--indications", "D51=1e300,D52=1,E5=1"),
         ("--load", "FY", "--at", "5", "--indications", "D51=1,D52=1,E5=1"),
         ("--load", "FY", "--monte-carlo", "5"),
         ("--load", "FY", "--temperature-coefficient", "1e-5"),

@@ -200,6 +200,7 @@ def test_the_text_of_the_next_run_shows_every_pair(run, diagnosed):
         (["--limit", "w=1..2"], "of u"),
         (["--limit", "u=a..b"], "NAME=LOW..HIGH"),
         (["--limit", "u=0..inf"], "NAME=LOW..HIGH"),
+        (["--limit", "u=0..1e300"], "NAME=LOW..HIGH"),
         (["--rate", "u=0"], "NAME=MOST"),
         (["--rate", "u=1..2"], "NAME=MOST"),
         (["--rate", "w=1"], "of u"),

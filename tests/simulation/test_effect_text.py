@@ -96,6 +96,7 @@ def test_conditions():
         ("relaxation=nan", "no number"),
         ("relaxation=infm", "no number"),
         ("relaxation=1e999m", "no number"),
+        ("steer_offset=1e200deg", "no number"),
         ("relaxation=0.5s", "another dimension"),
         ("relaxation=0.5blorps", "unit"),
         ("relaxation=0.5degC", "another dimension"),

@@ -58,7 +58,7 @@ def test_zero_gives_what_absence_gives_and_is_told_by_the_same_rule(name):
 @pytest.mark.parametrize(
     ("changes", "factor"),
     [
-        ({"PDY1": -1.01}, "mu_y = -1.01"),
+        ({"PDY1": -1.01, "PDY2": -0.1}, "mu_y = -1.01"),
         ({"PDY1": 10.1}, "mu_y = 10.1"),
         ({"LMUY": -1.0}, "mu_y = -1"),
         ({"LMUY": 0.0}, "mu_y = 0"),
@@ -79,6 +79,20 @@ def test_zero_gives_what_absence_gives_and_is_told_by_the_same_rule(name):
 def test_a_factor_that_no_tire_has_is_told_with_its_size(changes, factor):
     messages = [f.message for f in file_findings(tire(**changes)) if f.rule == "tir-factors"]
     assert any(factor in message for message in messages)
+
+
+@pytest.mark.parametrize("turned", [("PDY1", "PDY2"), ("PDX1", "PDX2")])
+def test_a_friction_that_is_written_negative_with_its_change_is_the_same_tire(turned):
+    """As the PAC2002 file of a truck tire 315/80 R22.5: PDY1 = -0.9, PDY2 = 0.18, PKY1 = -12.95."""
+    numbers = ENTRIES | dict(zip(turned, (0.9, -0.18), strict=True))
+    written, negative = tire(**numbers), tire(**numbers | {name: -numbers[name] for name in turned})
+    assert told(negative) == told(written) == []
+    slips = {"SA": [-0.1, 0.02, 0.07], "KAPPA": [0.0, 0.02, -0.05]}
+    first, second = (
+        evaluate_tir(file, FZ=[2000.0, 4000.0, 6000.0], **slips)[0] for file in (written, negative)
+    )
+    for channel in ("FX", "FY", "MZ"):
+        assert getattr(second, channel) == pytest.approx(getattr(first, channel), rel=1e-12)
 
 
 def test_a_negative_nominal_pressure_is_refused():

@@ -359,8 +359,9 @@ class _Judge:
         return tuple(signs)
 
     def _variant(self, hit: Hit) -> object:
+        # Of two that both explain the rows, and differ in the sign of a constant, that sign says nothing.
         group = self.groups[hit.group]
-        return (group.record.id, group.order, tuple(self._signs(hit, *sign) for sign in hit.signs))
+        return (group.record.id, group.order, tuple(self._signs(hit, *sign)[:-1] for sign in hit.signs))
 
     def _coefficients(self, hit: Hit) -> object:
         # By load: what each column, and the constant, is multiplied by in the file's units.

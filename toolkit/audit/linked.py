@@ -52,6 +52,10 @@ class RestingReport:
     names: Annotated[set[str], Entry(output=False)] = field(default_factory=set)
     hashes: Annotated[set[str], Entry(output=False)] = field(default_factory=set)
     linked_by: set[str] = field(default_factory=set)
+    alike: Annotated[
+        int | None,
+        Entry("tests of the name that it has, where nothing says which of them it is", sparse=True),
+    ] = None
     calibrations: Annotated[tuple[str, ...], Entry("that it names")] = ()
     tests: set[str] = field(default_factory=set)
     files: int = 0
@@ -108,37 +112,52 @@ def link(audit: ArchiveAudit, reports: tuple[RestingReport, ...]) -> Linked:
     for report in reports:
         for sha256 in report.hashes:
             by_hash.setdefault(sha256, []).append(report)
-    tests: dict[str, tuple[int, int, int]] = {}
-    in_force: dict[str, set[str]] = {}
+    # By test, and by report for what stands in none: files, those that are not right, those in dispute.
+    tests: dict[str | int, tuple[int, int, int]] = {}
+    in_force: dict[str | int, set[str]] = {}
+    held: dict[int, dict[str | int, set[str]]] = {}  # by report: its recordings in each test
     for plain in audit.files.plain():
-        test = plain["test"]
-        dirty = plain["grade"] not in CLEAN and not disputed(plain)
-        if test is not None:
-            n, bad, open_files = tests.get(test, (0, 0, 0))
-            tests[test] = (n + 1, bad + dirty, open_files + disputed(plain))
-            in_force.setdefault(test, set()).update({plain["in_force"]} - {None})
-        for same_report in by_hash.get(plain["sha256"] or "", ()):
-            same_report.linked_by.add("sha256" if same_report.id is None else "manifest")
-            if test is not None:
-                same_report.tests.add(test)
-            else:
-                same_report.files += 1
-                same_report.not_clean += dirty
-                same_report.disputed += disputed(plain)
+        sure = not disputed(plain)
+        dirty = plain["grade"] not in CLEAN and sure
+        here = by_hash.get(plain["sha256"] or "", ())
+        places = [id(report) for report in here] if plain["test"] is None else [plain["test"]]
+        for place in places:
+            n, bad, open_files = tests.get(place, (0, 0, 0))
+            tests[place] = (n + 1, bad + dirty, open_files + (not sure))
+            in_force.setdefault(place, set()).update({plain["in_force"]} - {None})
+        for report in here:
+            report.linked_by.add("sha256" if report.id is None else "manifest")
+            place = id(report) if plain["test"] is None else plain["test"]
+            held.setdefault(id(report), {}).setdefault(place, set()).add(plain["sha256"])
     names: dict[str, list[str]] = {}
     for test in tests:
-        names.setdefault(_words(audit.shown(test).rpartition("/")[2]), []).append(test)
+        if isinstance(test, str):
+            names.setdefault(_words(audit.shown(test).rpartition("/")[2]), []).append(test)
     for report in reports:
+        rests_on = _holding(held.get(id(report), {}))
         for test in _by_name(report, names):
-            report.tests.add(test)
+            rests_on.add(test)
             report.linked_by.add("test")
-        for test in report.tests:
-            report.files += tests[test][0]
-            report.not_clean += tests[test][1]
-            report.disputed += tests[test][2]
-            report.in_force |= in_force[test]
+        report.tests = {test for test in rests_on if isinstance(test, str)}
+        for place in rests_on:
+            report.files += tests[place][0]
+            report.not_clean += tests[place][1]
+            report.disputed += tests[place][2]
+            report.in_force |= in_force[place]
     with_report = {test for report in reports for test in report.tests}
-    return Linked(reports=reports, unknown=tuple(sorted(set(tests) - with_report)))
+    return Linked(
+        reports=reports,
+        unknown=tuple(sorted({test for test in tests if isinstance(test, str)} - with_report)),
+    )
+
+
+def _holding(held: Mapping[str | int, set[str]]) -> set[str | int]:
+    """Return the places that hold a report's recordings, without those that hold copies of some of them.
+
+    >>> sorted(_holding({"2018/A": {"1", "2"}, "2019/A": {"2"}, "2019/B": {"3"}, 7: {"1"}}))
+    ['2018/A', '2019/B']
+    """
+    return {place for place, hashes in held.items() if not any(hashes < others for others in held.values())}
 
 
 def _but_recordings(audit: ArchiveAudit, reports: tuple[RestingReport, ...]) -> tuple[RestingReport, ...]:
@@ -162,6 +181,8 @@ def _by_name(past_report: RestingReport, names: Mapping[str, list[str]]) -> Iter
                 continue
             # Tests of the same name in different folders: those whose folders are named too, if any are.
             inside = [test for test in tests if set(_words(test).split()) <= set(text.split())]
+            if len(inside or tests) > 1:
+                past_report.alike = len(inside or tests)
             yield from inside or tests
 
 

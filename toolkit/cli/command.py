@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-import math
 import pkgutil
 import typing
 from collections.abc import Callable, Mapping
@@ -19,6 +18,7 @@ from typing import Annotated, Any, TypedDict
 import typer
 
 from toolkit.errors import ConfigError
+from toolkit.files import is_number, number_expected
 from toolkit.printable import check_text, unprintable
 
 
@@ -64,17 +64,17 @@ class Command:
         """Refuse words that no document can print, and numbers that are none.
 
         A path is whatever the disk has, and is no such word. What has no limit is not stated: no command
-        takes a time, a size or a share that is infinite.
+        takes a time, a size or a share that is infinite, nor a number beyond those that files may hold.
         """
         for parameter in self._parameters:
             value = values[parameter.name]
             for given in value if isinstance(value, list | tuple) else (value,):
                 if type(given) is str and unprintable(given):
                     check_text(given, where=_word(parameter))
-                if type(given) is float and not math.isfinite(given):
+                if type(given) in (int, float) and not is_number(given):
                     raise ConfigError(
-                        "an option is no finite number", where=_word(parameter), got=given,
-                        expected="a number such as 1.5 or 2e3",
+                        "an option's number cannot be used", where=_word(parameter), got=given,
+                        expected=number_expected(given, "a number such as 1.5 or 2e3"),
                         next_step="state such a number, or leave the option out", rule="usage",
                     )  # fmt: skip
 

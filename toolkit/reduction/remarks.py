@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolkit.calibration.uncertainty.common_errors import reference_findings
 from toolkit.channels import CHANNELS
 from toolkit.findings import Finding
 from toolkit.reduction.limits import CONDITIONS, condition_finding, condition_of, farthest
@@ -240,9 +241,9 @@ def acquired_findings(files: Sequence[OpenedFile], record: CalibrationRecord) ->
 
 
 def record_findings(record: CalibrationRecord) -> list[Finding]:
-    """Tell that the record is only a legacy import."""
+    """Tell that the record is only a legacy import, or that no uncertainty holds its reference standard."""
     if record.verified:
-        return []
+        return [*reference_findings(record)]
     message = "the record is a legacy import without its reference data: nothing verifies its coefficients"
     return [Finding(rule="unverified", where=record.id, message=message)]
 

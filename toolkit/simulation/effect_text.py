@@ -15,7 +15,6 @@ value where it cannot be off.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 
@@ -23,6 +22,7 @@ from toolkit.effects.applied import AppliedEffect, Condition
 from toolkit.effects.catalogue import effect as find_effect
 from toolkit.effects.effect import Effect, EffectParameter
 from toolkit.errors import ConfigError, UnitError
+from toolkit.files import number_of
 from toolkit.machine import Machine
 from toolkit.simulation.places import (
     can_join,
@@ -191,8 +191,8 @@ def _number(effect: Effect, parameter: EffectParameter, text: str, stated: str, 
     if text.strip() in words:
         return words[text.strip()]
     match = _QUANTITY.fullmatch(text)
-    value = float(match[1]) if match else math.nan
-    if not match or not math.isfinite(value):
+    value = number_of(match[1]) if match else None
+    if match is None or value is None:
         raise _wrong(
             f"effect {effect.name!r} has no number", where, text.strip() or "nothing",
             f"a number in {stated} ({parameter.name}: {parameter.text})",

@@ -124,8 +124,8 @@ def _factors(tir: TirFile, p: Mapping[str, float]) -> Iterator[Finding]:
     friction, shape = (_LEAST_FRICTION, FRICTION.high), (0.0, _LARGEST_SHAPE)
     stiffness = _cornering(tir, p)
     rows = (
-        ("mu_x", "PDX1", (c("PDX1") + c("PDX2") * df) * s("LMUX"), friction, "friction of FX"),
-        ("mu_y", "PDY1", (c("PDY1") + c("PDY2") * df) * s("LMUY"), friction, "friction of FY"),
+        ("mu_x", "PDX1", _peak(c("PDX1"), c("PDX2"), df) * s("LMUX"), friction, "friction of FX"),
+        ("mu_y", "PDY1", _peak(c("PDY1"), c("PDY2"), df) * s("LMUY"), friction, "friction of FY"),
         ("C_x", "PCX1", c("PCX1") * s("LCX"), shape, "shape of FX"),
         ("C_y", "PCY1", c("PCY1") * s("LCY"), shape, "shape of FY"),
         ("C_t", "QCZ1", c("QCZ1"), shape, "shape of the trail"),
@@ -146,6 +146,20 @@ def _factors(tir: TirFile, p: Mapping[str, float]) -> Iterator[Finding]:
             f"at the nominal load the coefficients give {name} = {value:.4g}, the {text}; tires have {bound}"
         )
         yield _finding("tir-factors", tir, message)
+
+
+def _peak(at_nominal: float, change: float, df: float) -> float:
+    """Return the friction at a load ``df`` from the nominal one, positive in files that write it negative.
+
+    The sign of D = mu FZ is that of B = K / (C D) and drops out of D sin(C atan(B x)): some programs write
+    PDY1 below zero beside a PKY1 below zero. Its change with load then has the other sign too, since
+    friction falls with load; where it has not, the sign is a slip of the pen.
+
+    >>> _peak(0.9, -0.18, 0.5), _peak(-0.9, 0.18, 0.5), _peak(-0.9, -0.18, 0.5)
+    (0.81, 0.81, -0.99)
+    """
+    value = at_nominal + change * df
+    return -value if at_nominal < 0 <= change else value
 
 
 def _cornering(tir: TirFile, p: Mapping[str, float]) -> float:

@@ -13,8 +13,10 @@ from toolkit.calibration.registry.approval import approve, withdraw
 from toolkit.calibration.registry.candidate import calibrate
 from toolkit.calibration.registry.clock import today
 from toolkit.calibration.registry.registry import Registry
+from toolkit.calibration.registry.standing import withdrawal
 from toolkit.calibration.registry.verify import verify_registry
 from toolkit.errors import RecordError, RegistryError
+from toolkit.lab.records.registry_answer import void_day
 
 PROJECT = Registry(Path(__file__).resolve().parents[3] / "calibrations")
 
@@ -213,3 +215,14 @@ def test_the_error_names_every_name_that_must_differ(registry: Registry) -> None
         )  # fmt: skip
     assert caught.value.got == "approved by 'Bob', also checked by"
     assert caught.value.expected == "a name that is none of 'operator one' (entered by), 'Bob' (checked by)"
+
+
+def test_a_candidate_that_was_withdrawn_is_void_from_no_day_that_somebody_names(
+    registry: Registry, make_session: Callable[..., Path]
+) -> None:
+    calibrate(make_session(hub_data(60, 3), name="later"), registry)
+    withdraw(registry, "hub-r1", on=date(2026, 6, 1), void_from=date(2026, 5, 1), reason="wrong", by="B")
+    status = registry.status("hub-r1")
+    assert status.void_always
+    assert void_day(status) is None  # it never was in force: no day before the first of May is spared
+    assert withdrawal(status, date(2026, 4, 1))[0].text == "withdrawn on 2026-06-01: wrong"

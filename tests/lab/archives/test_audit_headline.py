@@ -93,6 +93,15 @@ def test_it_answers_how_many_how_wrong_why_and_since_when() -> None:
             "1 file carries a wrong Mz, up to 0.12 N·m; cause: computed by m15-r1, which was not in force; "
             "in 2014-03",
         ),
+        (
+            # which of its candidates computed it is open, and by none of them is a value wrong
+            [
+                file("ambiguous", candidates=["m15-r1"], repair={"FY_max_abs_N": 0.01, "MZ_max_abs_Nm": 0.0}),
+                file("stale", repair={"FY_max_abs_N": 0.0, "MZ_max_abs_Nm": 0.002}),
+            ],
+            "2 files were computed otherwise than by the record in force, or may have been, which changes "
+            "less than 0.1 N and 0.01 N·m",
+        ),
     ],
 )  # fmt: skip
 def test_each_kind_of_archive_has_its_sentence(files: list[dict[str, Any]], sentence: str) -> None:

@@ -63,7 +63,8 @@ def status_of(record_id: str, entries: Sequence[Entry], known_at: date) -> Recor
     since = min((e.since for e in approvals if e.since is not None), default=None)
     void_from = None
     if end is not None:
-        void_from = end.since if end.since is not None else (since or date.min)
+        # A record that never was in force has no day before which it could have served.
+        void_from = date.min if since is None else (end.since or since)
     approved_on = min((e.known_on for e in approvals if e.known_on is not None), default=None)
     last = approvals[-1] if approvals else None
     state: State = "approved" if approvals else "candidate"

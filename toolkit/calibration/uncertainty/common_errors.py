@@ -37,6 +37,7 @@ from toolkit.arrays import Array
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.statements import Statements, statements_of
 from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.findings import Finding
 
 _STEP = 1e-5
 
@@ -160,6 +161,24 @@ def standard_errors(record: CalibrationRecord, load: str) -> tuple[float, ...]:
     """
     covariance = record_covariance(record).get(load)
     return () if covariance is None else tuple(np.sqrt(np.diag(covariance)).tolist())
+
+
+def reference_findings(record: CalibrationRecord) -> tuple[Finding, ...]:
+    """Return that no uncertainty of a record's loads holds the standard that they were measured with.
+
+    A legacy import has no uncertainty at all, and says so.
+    """
+    reference = statements_of(record).reference
+    bare = [
+        load.load
+        for load in record.loads
+        if load.covariance and reference.of(load.load) is None and load.reference_u is None
+    ]
+    if not bare:
+        return ()
+    names = ", ".join(bare)
+    message = f"no uncertainty of the reference standard is stated of {names}: no uncertainty here holds it"
+    return (Finding(rule="reference-unstated", where=record.id, message=message, level="note"),)
 
 
 def scale_u(record: CalibrationRecord, load: LoadFit, statements: Statements) -> float:

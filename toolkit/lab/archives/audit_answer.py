@@ -131,6 +131,7 @@ class AuditAnswer(TypedDict):
 
 
 _SHOWN, _SETTINGS, _PATH = 40, 10, 40
+_HOW = 3  # its column
 _TROUBLES = ("unreadable-folder", "registry-damaged", "ledger-time")  # what no row of a file can tell
 
 
@@ -217,9 +218,9 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
     lines += _table(rows, width) if rows else []
     if bad > len(rows):
         lines.append(f"... and {bad - len(rows)} more; --json tells all of them")
-    counted = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
+    grades = ", ".join(f"{count} {grade}" for grade, count in audit.grades.items() if count)
     lines += _no_recordings(audit, width)
-    lines += ["", f"{len(audit.files)} files: {counted or 'none'}; known at {audit.known_at.isoformat()}"]
+    lines += ["", f"{len(audit.files)} files: {grades or 'none'}; known at {audit.known_at.isoformat()}"]
     for name, day in answer.approved_later.items():
         lines += textwrap.wrap(f"{name}: {approved_after(day, audit.known_at)}", width)
     notes = Counter(finding.rule for finding in audit.findings if finding.level == "note")
@@ -231,7 +232,9 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
         text = f"Fy or Mz that no tire has, in files: {len(impossible)} ({places}); --json tells why"
         lines += textwrap.wrap(text, width)
     settings = Counter(finding.message for finding in audit.findings if finding.rule == "test-toml")
-    lines += [one_line(f"{count} files: {message}") for message, count in settings.most_common(_SETTINGS)]
+    lines += [
+        one_line(f"{counted(count, 'file')}: {message}") for message, count in settings.most_common(_SETTINGS)
+    ]
     if len(settings) > _SETTINGS:
         lines.append(f"... and {len(settings) - _SETTINGS} more of test.toml; --json tells all of them")
     troubles = [f"{f.where}: {f.message}" for f in audit.findings if f.rule in _TROUBLES]
@@ -246,8 +249,19 @@ def text_of(answer: AuditOutcome, *, width: int = 80) -> str:
 
 
 def _table(rows: list[list[str]], width: int) -> list[str]:
-    """Return the table of files; what is the same for all of them stands below it."""
+    """Return the table of files; what is the same for all of them, or too long for it, stands below it."""
     header, align = ["file", "grade", "computed by", "how", "in force", "dFY [N]", "dMZ [N·m]"], "<<<<<>>"
+    reasons = list(dict.fromkeys(row[_HOW] for row in rows if row[_HOW]))
+    below: list[str] = []
+    if len(reasons) > 1 and len(table(header, rows, align=align).partition("\n")[0]) > width:
+        # A reason without its middle is none: in its place stands its number.
+        numbers = {reason: str(number) for number, reason in enumerate(reasons, start=1)}
+        rows = [[*row[:_HOW], numbers.get(row[_HOW], ""), *row[_HOW + 1 :]] for row in rows]
+        for reason, number in numbers.items():
+            below += textwrap.wrap(
+                one_line(reason), width, initial_indent=f"{number:>3}  ", subsequent_indent=5 * " "
+            )
+        below = ["how:", *below]
     constant = [
         len(rows) > 1 and side == "<" and len({row[at] for row in rows}) == 1 for at, side in enumerate(align)
     ]
@@ -266,7 +280,8 @@ def _table(rows: list[list[str]], width: int) -> list[str]:
         )
     ]
     common = [f"{header[at]} {rows[0][at]}" for at, alone in enumerate(constant) if alone and rows[0][at]]
-    return [*lines, *textwrap.wrap(f"all of them: {', '.join(common)}", width)] if common else lines
+    lines += textwrap.wrap(f"all of them: {', '.join(common)}", width) if common else []
+    return lines + below
 
 
 def _no_recordings(audit: ArchiveAudit, width: int) -> list[str]:
@@ -285,6 +300,8 @@ def _asked(answer: AuditOutcome, width: int) -> Iterator[str]:
             why = why if report.to_amend else "stands"
             if report.disputed:
                 why += f"; in {report.disputed} of {report.files} files the cells are changed, or may be"
+            if report.alike is not None:
+                why += f"; {report.alike} tests have the name that it gives, and nothing says which it is"
             tests = ", ".join(answer.made.shown(test) for test in sorted(report.tests))
             yield one_line(
                 f"report {report.report} ({tests}): {why}"

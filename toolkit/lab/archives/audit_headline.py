@@ -49,7 +49,10 @@ class Headline:
         int, Entry("files of which nothing says whether forces or cells are wrong", key="undecided")
     ] = 0
     small: Annotated[
-        int, Entry("files by another record that the one in force changes by less than is printed")
+        int,
+        Entry(
+            "files by another record, or perhaps so, that the one in force changes by less than is printed"
+        ),
     ] = 0
     stepping: Annotated[int, Entry("files with a force or cell that steps where nothing moved")] = 0
     copies: Annotated[
@@ -83,8 +86,8 @@ class Headline:
         if self.small:
             verb = "was" if self.small == 1 else "were"
             parts.append(
-                f"{_files(self.small)} {verb} computed by a record that was not in force, which changes "
-                f"less than {SMALL_FY_N:g} N and {SMALL_MZ_Nm:g} N·m"
+                f"{_files(self.small)} {verb} computed otherwise than by the record in force, or may have "
+                f"been, which changes less than {SMALL_FY_N:g} N and {SMALL_MZ_Nm:g} N·m"
             )
         if self.stepping:
             verb = "holds" if self.stepping == 1 else "hold"
@@ -173,7 +176,7 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
             unjudged += 1
         elif repair["FY_max_abs_N"] is None and repair["MZ_max_abs_Nm"] is None:
             bare += 1
-        elif file["grade"] == "stale" and _is_small(repair):
+        elif file["grade"] in ("stale", "ambiguous") and _is_small(repair):
             small += 1
         else:
             wrong += 1

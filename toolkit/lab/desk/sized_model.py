@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from toolkit.diagnosis.answer.reader import ANSWER, read_answer
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.estimate import plus_minus
-from toolkit.files import same_file
+from toolkit.files import number_of, same_file
 from toolkit.inputs import RESULT_FILE, TABLE_FILE, read_input, read_regular
 from toolkit.lab.desk.chart import Chart, Series, sampling
 from toolkit.lab.desk.holdings import CASE, Holdings
@@ -207,13 +207,13 @@ def _number(stated: Mapping[str, str], key: str, fitted: float, shown: str) -> f
     text = stated.get(key)
     if text is None or text == shown:
         return fitted
-    try:
-        return float(text.strip().replace(",", "."))
-    except ValueError:
+    number = number_of(text.replace(",", "."))
+    if number is None:
         raise ConfigError(
             "a size is no number", where=key.partition("-")[2], got=text or "nothing", expected="a number",
             next_step="type a number, such as 0.002", rule="wrong-value",
-        ) from None  # fmt: skip
+        )  # fmt: skip
+    return number
 
 
 PAGE, PREDICTIONS = "diagnosis.html", "predictions"

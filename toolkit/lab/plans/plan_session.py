@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 from toolkit.declared import Entry
 from toolkit.declared.answers import extended
 from toolkit.errors import ConfigError
-from toolkit.files import reads_as_number
+from toolkit.files import number_of, reads_as_number
 from toolkit.lab.answers import document_text, findings_text
 from toolkit.lab.plans.plan_sheets import SheetKey, TimingKey, untimed
 from toolkit.listing import one_line, or_dash, table
@@ -215,10 +215,8 @@ def _demand(record: CalibrationRecord, text: str) -> tuple[str, float, float | N
         factor = factor_to(fit.unit, name)
         if factor is None:
             raise _wrong("a demand has no unit that fits", "--u", text, f"{fit.unit}, or one like it")
-        try:
-            return float(number) * factor
-        except ValueError:
-            return math.nan
+        value = number_of(number)
+        return math.nan if value is None else value * factor
 
     value = in_own(match[2], match[3])
     if not (math.isfinite(value) and value > 0):

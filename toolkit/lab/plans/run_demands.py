@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from toolkit.errors import ConfigError
+from toolkit.files import number_of
 
 if TYPE_CHECKING:
     from toolkit.diagnosis.answer.answer import DiagnosedEffect
@@ -39,11 +40,9 @@ def stated_limits(spans: Sequence[str], rates: Sequence[str], case: Case) -> Run
 
     def read(text: str, option: str, form: str, count: int) -> tuple[str, tuple[float, ...]]:
         name, _, numbers = text.partition("=")
-        try:
-            ends = tuple(float(number) for number in numbers.split(".."))
-        except ValueError:
-            ends = ()
-        rising = len(ends) == count and all(map(math.isfinite, ends)) and (ends[0] < ends[-1] or count == 1)
+        read_ends = [number_of(number) for number in numbers.split("..")]
+        ends = tuple(end for end in read_ends if end is not None)
+        rising = len(ends) == len(read_ends) == count and (ends[0] < ends[-1] or count == 1)
         if name.strip() not in names or not rising or (count == 1 and ends[0] <= 0):
             example = f"{case.drivers[0].name}={'-10..10' if count > 1 else '5'}"
             raise wrong(

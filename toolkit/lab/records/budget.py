@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 from toolkit.calibration.uncertainty.monte_carlo import MonteCarloCheck
 from toolkit.declared.answers import entry_of
 from toolkit.errors import ConfigError, ToolkitError
+from toolkit.files import number_of
 from toolkit.findings import Finding, FindingEntry
 from toolkit.lab.answers import finding_lines
 from toolkit.listing import table
@@ -287,13 +288,12 @@ def values_of(text: str, where: str = "--indications") -> dict[str, float]:
     indications: dict[str, float] = {}
     for part in text.split(","):
         name, _, number = part.partition("=")
-        try:
-            value = float(number)
-        except ValueError as error:
+        value = number_of(number)
+        if value is None:
             raise _wrong(
                 "an indication cannot be read", where, part, "NAME=NUMBER,...",
                 "write each number with a decimal point, and a comma between them alone",
-            ) from error  # fmt: skip
+            )  # fmt: skip
         if name.strip() in indications:
             raise _wrong("an indication is given twice", where, name.strip(), "each of them once")
         indications[name.strip()] = value

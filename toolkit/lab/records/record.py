@@ -107,6 +107,7 @@ class Record(Face):
         from toolkit.calibration.apply import apply_record
         from toolkit.calibration.registry.clock import today
         from toolkit.calibration.registry.standing import standing
+        from toolkit.calibration.uncertainty.common_errors import reference_findings
         from toolkit.lab.quantities import columns_of, tare_of
         from toolkit.units import unit
 
@@ -135,7 +136,11 @@ class Record(Face):
             extrapolated=np.sum(self._outside(points), axis=0),
             index=getattr(data, "index", None),
             use=use,
-            findings=(*self._untared(zero is not None), *self._beyond(points)),
+            findings=(
+                *self._untared(zero is not None),
+                *self._beyond(points),
+                *(reference_findings(record) if uncertainty else ()),
+            ),
         )
 
     @checked
