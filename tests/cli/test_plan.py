@@ -20,7 +20,7 @@ from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
 from toolkit.planning import protocol_plan as planning
-from toolkit.planning import protocol_search
+from toolkit.planning import protocol_search, run_changes
 from toolkit.planning.sweep_search import least_sweeps
 
 ROOT = Path(toolkit.__file__).resolve().parents[1]
@@ -254,9 +254,10 @@ def test_an_input_beyond_what_was_recorded_is_said_to_be_known_by_equations_alon
     assert bool(beyond) is told
 
 
-def test_a_refusal_that_is_followed_is_a_plan(run, tmp_path):
-    """So slow that no run of sixteen recordings' time parts the class: it is made again and again."""
-    slow = ("--rate", "u=0.03", "--json")
+def test_a_refusal_that_is_followed_is_a_plan(run, tmp_path, monkeypatch):
+    """Where no single run may be longer or denser it is made again and again, as the refusal has asked."""
+    monkeypatch.setattr(run_changes, "_DOUBLINGS", 0)
+    slow = ("--rate", "u=0.15", "--json")
     short = run("plan", "next", left_open(tmp_path / "a"), *slow)
     assert (short.exception.rule, short.exception.exit_code) == ("plan-infeasible", 2)
     asked = re.search(r"--minutes (\S+)", str(short.exception.next_step))

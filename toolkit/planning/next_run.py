@@ -48,7 +48,9 @@ _STEPS = (2, 3, 5, 9)  # levels of a course
 _ROWS = 3  # of a recording, for a move of a course
 _ROUNDS = 2
 _CERTAIN = 2 * VERDICT.close
-_MOST_TIMES = 2**24  # as often nobody makes a run
+_MOST_TIMES = 2**24  # beyond which no number is told
+MOST_RECORDINGS = 1000
+"""Recordings of one run that a plan asks for: of more it says how long they would take, and plans none."""
 _ENOUGH = (1 - 1e-6) * _CERTAIN  # what lacks less is certain, and as good as any other
 
 
@@ -321,6 +323,7 @@ class RunSearch:
         As often as the time holds, and no oftener than it takes to be sure of the true member.
         """
         most = int(self.limits.longest_s / chosen.seconds * (1 + 1e-9)) if chosen.seconds > 0 else 0
+        most = min(most, MOST_RECORDINGS)
         if most < 2 or (least := self.repeated(chosen)) is None or least.times > most:
             return None
         sure = self.repeated(chosen, power=VERDICT.interval)

@@ -134,6 +134,7 @@ def nothing_parts(
     """Return the error of a class that no run within the limits parts, with what would."""
     from toolkit.diagnosis.answer.next_measurements import apart
     from toolkit.diagnosis.policy import VERDICT
+    from toolkit.planning.next_run import MOST_RECORDINGS
 
     most = max(0.0, *(gain for _, _, gain in chosen.pairs))
     steps = [] if complete else ["search longer with --budget"]
@@ -148,8 +149,9 @@ def nothing_parts(
     if search.problem.case.has_time:
         often, sure = search.repeated(chosen), search.repeated(chosen, power=VERDICT.interval)
         nearest += f"; {_needed(search, chosen, often, sure)}"
-        if asked := sure or often:
-            steps.append(f"--minutes {_up(asked.seconds / 60)} where it may take so long")
+        possible = [made for made in (sure, often) if made is not None and made.times <= MOST_RECORDINGS]
+        if possible:
+            steps.append(f"--minutes {_up(possible[0].seconds / 60)} where it may take so long")
     return ConfigError(
         "no run within the limits parts the class", where="--limit, --rate, --minutes",
         got=f"{' and '.join((effect.name, *effect.equivalent_to))}: expected log-evidence {most:.2g}",
