@@ -1,6 +1,7 @@
 """The classes that sealed batches left: does one proposed run name the right member?
 
-    python -m tests.campaigns.sealed_classes [--drawn SEED] [--minutes 30] [--cases 100] [--seed 27]
+    python -m tests.campaigns.sealed_classes [--drawn SEED] [--family NAME ...] [--effect NAME ...]
+        [--minutes 30] [--cases 100] [--seed 27]
 
 A sealed batch of the proof (`proof/*.jsonl.gz`) keeps what the tool answered to each case, and the seed that
 draws the case again. A case counts where the answer has a class that holds a true effect, and where what is
@@ -40,7 +41,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,7 @@ from scipy.interpolate import Akima1DInterpolator
 
 from proof import draw, process_noise, proof_file
 from proof import model as generated
+from proof.catalogue import FAMILIES
 from proof.files import write_case
 from tests.coverage.rows import exact_interval
 from toolkit.diagnosis.answer.answer import DiagnosedEffect, EffectEstimate, EffectEvidence
@@ -125,13 +127,20 @@ class SealedClass:
         return again if same else None
 
 
-def drawn_classes(seed: int) -> Iterator[SealedClass]:
-    """Yield classes drawn anew, without end."""
+def drawn_classes(
+    seed: int, *, families: Sequence[str] = (), effects: Sequence[str] = ()
+) -> Iterator[SealedClass]:
+    """Yield classes drawn anew, without end: of all kinds, or of effects of families, each as likely."""
     share = np.array([draw.MIX[bucket] for bucket in BUCKETS])
     for index in itertools.count():
-        bucket = str(np.random.default_rng([seed, index, 99]).choice(BUCKETS, p=share / share.sum()))
+        rng = np.random.default_rng([seed, index, 99])
+        bucket, picked = str(rng.choice(BUCKETS, p=share / share.sum())), None
+        if families:
+            family = str(rng.choice(families))
+            among = [name for name in FAMILIES[family].inside if not effects or name in effects]
+            bucket, picked = "single", (family, (str(rng.choice(among)),))
         try:
-            again = draw.draw_case(seed, index, bucket)
+            again = draw.draw_case(seed, index, bucket, picked=picked)
         except RuntimeError:  # no draw met its conditions
             continue
         sealed = again.answer
@@ -222,11 +231,21 @@ def carried_out(
     return there, draw._recorded(alone, before[0], drawn.effects, 0.0, rng)
 
 
-def with_run(drawn: draw.Drawn, run: Run, name: str, folder: Path, rng: np.random.Generator) -> Problem:
-    """Return the problem with one more run, as the truth answers it."""
-    more, outputs = carried_out(drawn, run, name, rng)
-    s = dataclasses.replace(drawn.scenario, runs=(*drawn.scenario.runs, more))
-    write_case(s, [*drawn.measured, outputs], folder)
+def with_run(
+    drawn: draw.Drawn, run: Run, name: str, folder: Path, rng: np.random.Generator, times: int = 1
+) -> Problem:
+    """Return the problem with one more run, made so many times, as the truth answers it."""
+    made = []
+    recorded = drawn.scenario.runs
+    # One after the other where all recordings have one clock.
+    pause = max(float(run.t[0] - recorded[-1].rows[-1]), 0.0)
+    every = float(run.t[-1] - run.t[0]) + pause if pause else 0.0
+    for place in range(times):
+        there = dataclasses.replace(run, t=run.t + place * every)
+        answered, outputs = carried_out(drawn, there, name, rng)
+        made.append((dataclasses.replace(answered, name=f"next{place + 1}.csv"), outputs))
+    s = dataclasses.replace(drawn.scenario, runs=(*drawn.scenario.runs, *(answered for answered, _ in made)))
+    write_case(s, [*drawn.measured, *(outputs for _, outputs in made)], folder)
     return problem(folder / "CASE.toml")
 
 
@@ -314,8 +333,18 @@ class Outcome:
         return len(self.together) < len(self.members) * (len(self.members) - 1) // 2
 
 
-def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) -> Outcome | str:
-    """Return what is named after one more run of each kind, or why the case does not count."""
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class Posed:
+    """A class that counts: as drawn, its problem, its members as fitted, and the true effect."""
+
+    drawn: draw.Drawn
+    problem: Problem
+    members: tuple[Member, ...]
+    true: str
+
+
+def posed_class(left: SealedClass, folder: Path) -> Posed | str:
+    """Return a class with its members fitted, or why it does not count; its case in a folder."""
     found = next(effect for effect in left.effects if effect.equivalent_to)
     drawn = left.drawn()
     if drawn is None:
@@ -328,7 +357,6 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
         return "no true effect in the class"
     write_case(drawn.scenario, drawn.measured, folder / "before")
     posed = problem(folder / "before" / "CASE.toml")
-    began = time.process_time()
     try:
         members = members_of(posed, left.effects, found)
     except ConfigError:
@@ -337,6 +365,16 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
         return "the true effect is no candidate of a diagnosis"
     if left.new is not None and named(posed, members) is not None:
         return "the recordings name one"
+    return Posed(drawn=drawn, problem=posed, members=members, true=true[0])
+
+
+def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) -> Outcome | str:
+    """Return what is named after one more run of each kind, or why the case does not count."""
+    began = time.process_time()
+    class_ = posed_class(left, folder)
+    if isinstance(class_, str):
+        return class_
+    drawn, posed, members = class_.drawn, class_.problem, class_.members
     ends = time.process_time() + SEARCH_S
     limits = laboratory_limits(posed)
     search = RunSearch(
@@ -361,9 +399,9 @@ def after_one_more(left: SealedClass, folder: Path, rng: np.random.Generator) ->
             names[label] = None
     return Outcome(
         case=f"{left.batch} {left.name} {left.sealed['bucket']} {left.sealed['family']}",
-        members=tuple(member.fit.active[-1].effect.name for member in members), true=true[0],
+        members=tuple(member.fit.active[-1].effect.name for member in members), true=class_.true,
         power=chosen.power, together=chosen.together, named=names, steps="; ".join(best.words()),
-        seconds=took, length=best.length, needed=again[0] if again else None,
+        seconds=took, length=best.length, needed=again and again.times,
         most=search.farthest * limits.longest_s,
     )  # fmt: skip
 
@@ -417,6 +455,8 @@ def main() -> None:
     """Print every outcome as it comes, then the table."""
     parser = argparse.ArgumentParser(prog="python -m tests.campaigns.sealed_classes", description=__doc__)
     parser.add_argument("--drawn", type=int, help="seed of classes drawn anew, in place of the batches")
+    parser.add_argument("--family", action="append", default=[], choices=FAMILIES, help="of these alone")
+    parser.add_argument("--effect", action="append", default=[], help="of these alone, with --family")
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=27)
@@ -426,7 +466,7 @@ def main() -> None:
         listed, absent = classes()
         sys.stdout.write(f"{len(listed)} classes of sealed batches; left out: {dict(absent)}\n")
     else:
-        listed = drawn_classes(given.drawn)
+        listed = drawn_classes(given.drawn, families=given.family, effects=given.effect)
     rows: list[Outcome] = []
     uncounted: Counter[str] = Counter()
     for outcome in outcomes(itertools.islice(listed, given.cases), given.minutes, given.seed):

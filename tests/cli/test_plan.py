@@ -20,7 +20,7 @@ from toolkit.declared import json_value
 from toolkit.errors import ConfigError
 from toolkit.lab.plans import protocol_plan
 from toolkit.planning import protocol_plan as planning
-from toolkit.planning import protocol_search
+from toolkit.planning import protocol_search, run_changes
 from toolkit.planning.sweep_search import least_sweeps
 
 ROOT = Path(toolkit.__file__).resolve().parents[1]
@@ -108,6 +108,7 @@ def test_what_cannot_be_reached_names_the_nearest_plan_and_writes_nothing(run, q
         (["--u", "conicity=1 furlong"], "plan-demand"),
         (["--minutes", "0.5"], "plan-infeasible"),
         (["--between-files", "inf"], "usage"),
+        (["--between-files", "1e300"], "plan-infeasible"),
         (["--minutes", "inf"], "usage"),
     ],
 )
@@ -240,6 +241,36 @@ def test_a_run_may_be_as_long_as_the_case_or_an_option_says(run, tmp_path):
         assert "times as long" in " ".join(said["steps"])
     rows = (tmp_path / "n" / "next.csv").read_text().splitlines()[1:]
     assert float(rows[-1].split(",")[0]) == pytest.approx(said["seconds"], abs=0.1)
+
+
+@pytest.mark.parametrize(("limit", "told"), [("u=-1..1", False), ("u=-8..8", True)])
+def test_an_input_beyond_what_was_recorded_is_said_to_be_known_by_equations_alone(
+    run, diagnosed, limit, told
+):
+    planned = run("plan", "next", diagnosed, "--limit", limit, "--json")
+    assert planned.return_value == 0, planned
+    beyond = [
+        text for text in json.loads(planned.stdout)["assumptions"] if "u was recorded from -2 to 2" in text
+    ]
+    assert bool(beyond) is told
+
+
+def test_a_refusal_that_is_followed_is_a_plan(run, tmp_path, monkeypatch):
+    """Where no single run may be longer or denser it is made again and again, as the refusal has asked."""
+    monkeypatch.setattr(run_changes, "_DOUBLINGS", 0)
+    slow = ("--rate", "u=0.15", "--json")
+    short = run("plan", "next", left_open(tmp_path / "a"), *slow)
+    assert (short.exception.rule, short.exception.exit_code) == ("plan-infeasible", 2)
+    asked = re.search(r"--minutes (\S+)", str(short.exception.next_step))
+    assert asked is not None
+    planned = run("plan", "next", left_open(tmp_path / "b"), *slow, "--minutes", asked[1], "--out", "n")
+    assert planned.return_value == 0, planned
+    said = json.loads(planned.stdout)
+    assert said["times"] > 1
+    assert said["power"] > 0.9
+    assert said["seconds"] <= 60 * float(asked[1])
+    assert f"made {said['times']} times, one after the other" in " ".join(said["steps"])
+    assert f"made {said['times']} times" in (tmp_path / "n" / "operator.txt").read_text()
 
 
 def test_what_is_shorter_than_a_row_is_refused_with_the_rate_that_parts_it_and_planned_at_it(run, tmp_path):

@@ -86,9 +86,14 @@ def test_a_run_that_is_too_short_is_as_long_as_is_said_to_be_needed(tmp_path: Pa
     assert not short.parts
     needed = search.repeated(short)
     assert needed is not None
-    times, power = needed
+    times = needed.times
     assert 1 < times < 16
-    assert power > short.power
+    assert needed.seconds == pytest.approx(times * np.ptp(T))
+    assert needed.power > short.power
+    sure = search.repeated(short, power=0.95)
+    assert sure is not None
+    assert sure.power >= 0.95 > needed.power
+    assert sure.times > times
 
     longer = anew(search, limits=dataclasses.replace(limits, longest_s=2.0 * times * float(np.ptp(T))))
     chosen = longer.judge(longer.best())
@@ -111,6 +116,28 @@ def test_a_run_that_is_too_short_is_as_long_as_is_said_to_be_needed(tmp_path: Pa
     sd = max(member.fit.noise["F"].sd for member in members)
     assert search.farthest * 0.02 <= 0.5 * (apart / sd) ** 2 * (1 + 1e-6)
     assert VERDICT.close / search.farthest < times * np.ptp(T)  # the least time is less than one that does
+
+
+def test_a_run_that_parts_nothing_is_made_as_often_as_its_time_holds(tmp_path: Path) -> None:
+    """No oftener than it takes to be sure, and never where the time holds too few to part anything."""
+    posed = problem(write_case(tmp_path, delay=0.02))
+    members = members_of(posed, (EFFECT,), EFFECT)
+    limits = RunLimits(rates={"u": 0.06 * max(fastest(run.t, run.columns["u"]) for run in posed.runs)})
+    search = RunSearch(problem=posed, members=members, limits=limits)
+    short = search.judge(search.best())
+    assert short is not None
+    assert search.made_again(short) is None
+    least, sure = search.repeated(short), search.repeated(short, power=0.95)
+    assert least is not None
+    assert sure is not None
+
+    def within(times: float) -> next_run.NextRun | None:
+        longer = dataclasses.replace(limits, longest_s=times * float(np.ptp(T)))
+        return anew(search, limits=longer).made_again(short)
+
+    assert within(least.times - 0.5) is None
+    made = [within(least.times), within(sure.times - 0.5), within(10.0 * sure.times)]
+    assert [run and run.times for run in made] == [least.times, sure.times - 1, sure.times]
 
 
 def test_the_power_is_that_of_the_nearest_of_the_others() -> None:

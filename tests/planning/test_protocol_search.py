@@ -80,6 +80,19 @@ def test_the_screen_of_the_exchange_agrees_with_the_budget() -> None:
         assert screened == pytest.approx(found.worst, rel=0.05)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_demand_that_nothing_comes_near_is_screened_as_any_other() -> None:
+    asked = question("conicity=2 N", loads=NEAR, measured=NEAR)
+    absurd = question(f"conicity={2 * 2.0**-990} N", loads=NEAR, measured=NEAR)
+    designs = np.array([[0, 3, 5, 6, 7, 10, 12], [0, 2, 4, 6, 8, 10, 12]])
+    losses = []
+    for one in (asked, absurd):
+        search = ProtocolSearch(one, tread(measured=NEAR), NEAR)
+        losses.append(criterion(search._screens, designs))
+    assert np.argsort(losses[1]).tolist() == np.argsort(losses[0]).tolist()
+    assert np.isfinite(losses[1]).all()
+
+
 def test_the_screen_knows_what_the_form_of_the_curves_misses() -> None:
     """It adds up over both sides and directions: by squares alone it would be three times as large here."""
     form = np.array([0.0] * 7 + [30.0**2, 0.6**2, math.radians(0.01) ** 2])

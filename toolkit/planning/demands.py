@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 
 PEAK = "peak"
+LARGEST = 1e9
+"""A demand, of any unit: no tire and no machine makes as much."""
 _FORM = re.compile(
     r"\s*(?P<name>\w+)\s*(?:@\s*(?P<angle>[-+]?[\d.]+)\s*deg)?\s*"
     r"(?:=\s*(?P<size>[\d.]+(?:[eE][-+]?\d+)?)\s*(?P<unit>\S.*?)?\s*)?"
@@ -85,8 +87,9 @@ def parse_demand(text: str) -> Demand:
     """
     match = _FORM.fullmatch(text)
     size = _number(match["size"]) if match and match["size"] is not None else 1.0
-    if match is None or not (math.isfinite(size) and size > 0):
-        raise _wrong("a demand cannot be read", text, "NAME=NUMBER UNIT, above 0: 'conicity=5 N', 'peak=1 %'")
+    if match is None or not 0 < size <= LARGEST:
+        expected = f"NAME=NUMBER UNIT, above 0 and at most {LARGEST:g}: 'conicity=5 N', 'peak=1 %'"
+        raise _wrong("a demand cannot be read", text, expected)
     name, written = match["name"], match["unit"]
     known = (PEAK, *by_name())
     if name not in known:

@@ -48,13 +48,15 @@ _STEPS = (2, 3, 5, 9)  # levels of a course
 _ROWS = 3  # of a recording, for a move of a course
 _ROUNDS = 2
 _CERTAIN = 2 * VERDICT.close
-_MOST_TIMES = 2.0**24  # as often nobody makes a run
+_MOST_TIMES = 2**24  # beyond which no number is told
+MOST_RECORDINGS = 1000
+"""Recordings of one run that a plan asks for: of more it says how long they would take, and plans none."""
 _ENOUGH = (1 - 1e-6) * _CERTAIN  # what lacks less is certain, and as good as any other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NextRun:
-    """A run with what it parts.
+    """A run with what it parts, made so many ``times``, one after the other.
 
     ``pairs`` are (true member, other, expected log-evidence); ``power`` the chance that the
     true one is named.
@@ -65,6 +67,12 @@ class NextRun:
     pairs: tuple[tuple[str, str, float], ...]
     predicted: tuple[Predicted, ...]
     power: float
+    times: int = 1
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes, all of its recordings."""
+        return self.times * float(self.run.t[-1] - self.run.t[0])
 
     @property
     def together(self) -> tuple[tuple[str, str], ...]:
@@ -291,28 +299,43 @@ class RunSearch:
         pairs = self._pairs(run, predictions)
         return NextRun(change=change, run=run, pairs=pairs, predicted=predictions, power=power_of(pairs))
 
-    def repeated(self, chosen: NextRun) -> tuple[int, float] | None:
-        """Return how often a run has to be made until it parts a pair, and the power then.
+    def repeated(self, chosen: NextRun, *, power: float = 0.0) -> NextRun | None:
+        """Return a run made as often as it takes until it parts a pair, with a power at least.
 
         None where so many times are not enough that nobody makes them.
         """
-
-        def parted(times: float) -> NextRun:
-            pairs = self._pairs(chosen.run, chosen.predicted, times)
-            return dataclasses.replace(chosen, pairs=pairs, power=power_of(pairs))
-
-        low, high = 1.0, 2.0
-        while not (found := parted(high)).parts:
+        low, high = 1, 2
+        while not _serves(found := self._made(chosen, high), power):
             low, high = high, 2 * high
             if high > _MOST_TIMES:
                 return None
-        while round(high) - round(low) > 1:
-            middle = round((low + high) / 2)
-            if (tried := parted(middle)).parts:
+        while high - low > 1:
+            middle = (low + high) // 2
+            if _serves(tried := self._made(chosen, middle), power):
                 high, found = middle, tried
             else:
                 low = middle
-        return round(high), found.power
+        return found
+
+    def made_again(self, chosen: NextRun) -> NextRun | None:
+        """Return a run that parts no pair, made again and again within the longest time; None for none.
+
+        As often as the time holds, and no oftener than it takes to be sure of the true member.
+        """
+        most = int(self.limits.longest_s / chosen.seconds * (1 + 1e-9)) if chosen.seconds > 0 else 0
+        most = min(most, MOST_RECORDINGS)
+        if most < 2 or (least := self.repeated(chosen)) is None or least.times > most:
+            return None
+        sure = self.repeated(chosen, power=VERDICT.interval)
+        return sure if sure is not None and sure.times <= most else self._made(chosen, most)
+
+    def _made(self, chosen: NextRun, times: int) -> NextRun:
+        pairs = self._pairs(chosen.run, chosen.predicted, times)
+        return dataclasses.replace(chosen, pairs=pairs, power=power_of(pairs), times=times)
+
+
+def _serves(made: NextRun, power: float) -> bool:
+    return made.parts and made.power >= power
 
 
 def _as_long(change: Change, times: float) -> Change:

@@ -165,6 +165,7 @@ def plan_protocol(
         values=_values(question, plan, of_protocol, same_time, () if choice is None else choice.reaches),
         assumptions=(
             *_assumptions(earlier, others, whole, units),
+            *_of_conicity(demands, loads_N, earlier, units),
             *(sweep_assumptions(sweeps, machine.sweeping, tires) if sweeps and machine.sweeping else ()),
         ),
         gives_up=_gives_up(plan.design, protocol, units),
@@ -301,12 +302,39 @@ def _assumptions(
     return tuple(statements)
 
 
+def _of_conicity(
+    demands: Sequence[Demand], loads_N: Sequence[float], earlier: EarlierTest, units: PrintedUnits
+) -> list[str]:
+    """Return at which loads conicity is planned, by what is turned, and what no budget parts from it then.
+
+    What the machine adds to FY by itself points to one side of the machine. With the drum reversed conicity
+    does too; with the tire turned round on its hub it changes its sign.
+    """
+    if all(demand.name != "conicity" for demand in demands):
+        return []
+    loads = _printed(sorted(loads_N), units)
+    if earlier.shared.reversal == "tire":
+        return [
+            f"conicity at {loads} is by turning the tire round on its hub, as in the earlier test: camber of "
+            "the wheel, crosstalk of the load into FY and zeros of the cells drop out of it, and the zeros "
+            "are whole in plysteer"
+        ]
+    return [
+        f"conicity at {loads} is by reversing the drum, the tire not turned round on its hub: camber of the "
+        "wheel and crosstalk of the load into FY are taken for conicity and are in no U; as many rows with "
+        "the tire turned round would part them, and leave zeros of the cells whole in plysteer"
+    ]
+
+
+def _printed(loads_N: Sequence[float], units: PrintedUnits) -> str:
+    return ", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in loads_N) + f" {units.force}"
+
+
 def _gives_up(design: Design, protocol: Design, units: PrintedUnits) -> tuple[str, ...]:
     lost = []
     loads = [load for load in protocol.loads_N if load not in design.loads_N]
     if loads:
-        shown = ", ".join(f"{units.shown(load, 'N')[0]:.0f}" for load in loads)
-        lost.append(f"every characteristic at {shown} {units.force}")
+        lost.append(f"every characteristic at {_printed(loads, units)}")
     if set(design.rotations) < set(protocol.rotations):
         lost.append("the reversed runs: conicity, plysteer, CRAT and PRAT")
     steps = sorted(set(protocol.slip_angles_rad) - set(design.slip_angles_rad))

@@ -86,7 +86,10 @@ def _between(tangents: Array, pseudo: Array, variances: Array) -> Array:
 def criterion(screens: Sequence[Screen], designs: NDArray[np.intp]) -> Array:
     """Return the largest ratio (designs,) of all screens, where many are alike a little more."""
     ratios = np.concatenate([part for screen in screens for part in screen.ratios(designs)], axis=1)
-    return np.asarray(np.sum(ratios**_POWER, axis=1) ** (1 / _POWER))
+    # By a power of two, which is exact: the powers of a demand far below what can be had are too large.
+    scale = np.frexp(ratios.max(axis=1))[1]
+    scaled = np.ldexp(ratios, -scale[:, None])
+    return np.asarray(np.ldexp(np.sum(scaled**_POWER, axis=1) ** (1 / _POWER), scale))
 
 
 def openness(screens: Sequence[Screen], design: Sequence[int]) -> float:

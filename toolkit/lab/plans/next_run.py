@@ -54,6 +54,7 @@ class PlanNextAnswer(NextRunPlan):
 
 
 INPUTS, PREDICTIONS, STEPS = "next.csv", "predictions.csv", "operator.txt"
+_AS_RECORDED = 0.01  # of an input's span
 _PLAIN, _APART = re.compile(r"[A-Za-z0-9_]{1,40}"), "_apart"
 
 
@@ -138,6 +139,8 @@ def plan_next(
         # A repeat was made once: limits of the next run are none of it.
         recorded = dataclasses.replace(search, limits=RunLimits(), judged={}, runs={}) if reach else search
         repeat = recorded.judge(Change(run=best.run))
+        if chosen is not None and not chosen.parts:
+            chosen = search.made_again(chosen) or chosen
         stays = chosen is not None and not chosen.parts
         complete = time.monotonic() < ends
         longer = time.monotonic() + budget_s / 3
@@ -148,7 +151,7 @@ def plan_next(
     if stays:
         raise nothing_parts(search, chosen, effect, denser, complete=complete)
     driven = [name for name, _ in movable(problem, reach)]
-    plan = _plan(read, diagnosis.effects, members, chosen, repeat, driven, len(search.judged), complete)
+    plan = _plan(problem, diagnosis.effects, members, chosen, repeat, driven, len(search.judged), complete)
     answer = extended(PlanNextAnswer, plan, out=out)
     if out is not None:
         figures = plots(problem, members, chosen)
@@ -184,7 +187,7 @@ def _case_of(file: Path) -> Path:
 
 
 def _plan(
-    case: Case,
+    problem: Problem,
     effects: Sequence[Any],
     members: Sequence[Member],
     chosen: NextRun,
@@ -193,19 +196,22 @@ def _plan(
     judged: int,
     complete: bool,
 ) -> NextRunPlan:
+    case = problem.case
     likelihood = {member.label: member.fit.log_posterior for member in members}
     again = {(true, other): gain for true, other, gain in repeat.pairs}
     first, *others = [effect for effect in effects if effect.equivalent_to]
     names = {first.name, *first.equivalent_to}
     fitted = {member.fit.active[-1].effect.name for member in members}
     run = chosen.run
+    often = f"made {chosen.times} times, one after the other, each a recording of its own"
     return NextRunPlan(
         case_sha256=case.sha256,
         members=tuple(member.label for member in members),
         lost=tuple(sorted(names - fitted)),
-        steps=(*chosen.change.words(), *_ranges(case, run, driven)),
+        steps=(*chosen.change.words(), *([often] if chosen.times > 1 else []), *_ranges(case, run, driven)),
         conditions=dict(run.conditions),
-        seconds=float(run.t[-1] - run.t[0]),
+        seconds=chosen.seconds,
+        times=chosen.times,
         pairs=tuple(
             PartedPair(
                 true=true, other=other, recorded=likelihood[true] - likelihood[other],
@@ -220,9 +226,27 @@ def _plan(
         complete=complete,
         assumptions=(
             *ASSUMPTIONS,
+            *_beyond_recorded(problem, run, driven),
             *(f"the class of {other.name} is another one, not planned for here" for other in others),
         ),
     )  # fmt: skip
+
+
+def _beyond_recorded(problem: Problem, run: Run, driven: Sequence[str]) -> list[str]:
+    """Return what members are asked of inputs at which nothing was recorded."""
+    from toolkit.planning.run_changes import reach
+
+    units = {channel.name: channel.unit.replace("*", "·") for channel in problem.case.channels}
+    told = []
+    for name in driven:
+        (low, high), column = reach(problem, name), run.columns[name]
+        slack = _AS_RECORDED * (high - low)
+        if column.min() < low - slack or column.max() > high + slack:
+            told.append(
+                f"{name} was recorded from {low:.4g} to {high:.4g} {units[name]}: beyond, members are as "
+                "their equations have them, which nothing was held against"
+            )
+    return told
 
 
 def _ranges(case: Case, run: Run, driven: Sequence[str]) -> list[str]:

@@ -41,6 +41,8 @@ class PlanIntervalAnswer(IntervalPlan):
 
 LEAST = 0.5
 """Reliability below which an interval is none."""
+MOST_TESTS = round(365.25 * 86400)
+"""Tests in a year: no machine makes more than one a second."""
 
 
 def interval_plan_answer(
@@ -68,8 +70,8 @@ def interval_plan_answer(
 
     if not LEAST <= reliability < 1:
         raise _wrong("--reliability", reliability, f"a share from {LEAST:g} to below 1, such as 0.95")
-    if tests_a_year is not None and tests_a_year < 0:
-        raise _wrong("--tests", tests_a_year, "tests a year, 0 or more")
+    if tests_a_year is not None and not 0 <= tests_a_year <= MOST_TESTS:
+        raise _wrong("--tests", tests_a_year, f"tests a year, 0 to {MOST_TESTS}, which is one a second")
     due = due_of(registry, instrument, registry.today())
     if load is not None:
         registry.load(due.record).load(load)  # refuses a load that the record does not have

@@ -197,7 +197,7 @@ def _basis(
 
 def _demand(record: CalibrationRecord, text: str) -> tuple[str, float, float | None]:
     """Read ``FY=20 N`` or ``FY=20 N at 4 kN`` into the load, U and the load of it, in the record's unit."""
-    from toolkit.planning.demands import factor_to
+    from toolkit.planning.demands import LARGEST, factor_to
 
     match = _DEMAND.fullmatch(text)
     names = [fit.load for fit in record.loads]
@@ -219,8 +219,8 @@ def _demand(record: CalibrationRecord, text: str) -> tuple[str, float, float | N
         return math.nan if value is None else value * factor
 
     value = in_own(match[2], match[3])
-    if not (math.isfinite(value) and value > 0):
-        raise _wrong("an uncertainty cannot be used", "--u", text, "a number above 0")
+    if not 0 < value <= LARGEST:
+        raise _wrong("an uncertainty cannot be used", "--u", text, f"a number above 0, {LARGEST:g} at most")
     at = None if match[4] is None else in_own(match[4], match[5])
     if at is not None and not (math.isfinite(at) and at):
         raise _wrong("a load cannot be used", "--u", text, "a finite load other than 0")

@@ -45,6 +45,8 @@ class PlanTestAnswer(ProtocolPlan):
 
 PROTOCOL, SIMULATION = "protocol.toml", "plan.toml"
 DEMANDS = ("slope_cornering", "conicity", "plysteer", "peak")
+LONGEST_PAUSE_S = 86400.0
+"""From one recording of a test to the next: what takes longer is another test."""
 _SIMULATED = 3  # tests of a tire file: the scatter of one alone is not sure
 
 
@@ -138,6 +140,8 @@ def _refuse_without_room(order: ProtocolOrder) -> None:
         "--rise": (order.rise_K, "kelvins above 0"),
     }
     wrong = {name: stated for name, stated in limits.items() if not stated[0] > 0}
+    if order.between_files_s is not None and not 0 <= order.between_files_s <= LONGEST_PAUSE_S:
+        wrong["--between-files"] = order.between_files_s, f"0 to {LONGEST_PAUSE_S:g} s, which is a day"
     for name, (size, expected) in wrong.items():
         raise ConfigError(
             "a limit is no number that a test can keep", where=name, got=size, expected=expected,
@@ -335,7 +339,7 @@ def _infeasible(plan: ProtocolPlan, minutes: float) -> ConfigError:
     return ConfigError(
         f"no test{limit} reaches what is demanded", where="--u",
         got="; ".join(
-            f"{value.name} U = {round_uncertainty(value.demanded_U)} {value.unit} at {value.load_N:.0f} N"
+            f"{value.name} U = {value.demanded_U:.4g} {value.unit} at {value.load_N:.0f} N"
             for value in missed
         ),
         expected=f"at least: {'; '.join(nearest)}",

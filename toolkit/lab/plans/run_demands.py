@@ -133,6 +133,7 @@ def nothing_parts(
     """Return the error of a class that no run within the limits parts, with what would."""
     from toolkit.diagnosis.answer.next_measurements import apart
     from toolkit.diagnosis.policy import VERDICT
+    from toolkit.planning.next_run import MOST_RECORDINGS
 
     most = max(0.0, *(gain for _, _, gain in chosen.pairs))
     steps = [] if complete else ["search longer with --budget"]
@@ -145,7 +146,11 @@ def nothing_parts(
         )
         steps.append(f"--sample-rate {rate} where rows can be recorded so densely")
     if search.problem.case.has_time:
-        nearest += f"; {_needed(search, chosen)}"
+        often, sure = search.repeated(chosen), search.repeated(chosen, power=VERDICT.interval)
+        nearest += f"; {_needed(search, chosen, often, sure)}"
+        possible = [made for made in (sure, often) if made is not None and made.times <= MOST_RECORDINGS]
+        if possible:
+            steps.append(f"--minutes {_up(possible[0].seconds / 60)} where it may take so long")
     return ConfigError(
         "no run within the limits parts the class", where="--limit, --rate, --minutes",
         got=f"{' and '.join((effect.name, *effect.equivalent_to))}: expected log-evidence {most:.2g}",
@@ -155,12 +160,13 @@ def nothing_parts(
     )  # fmt: skip
 
 
-def _needed(search: RunSearch, chosen: NextRun) -> str:
-    """Return how long a run would have to be: as the nearest goes on, and at least, whatever its course."""
+def _needed(search: RunSearch, chosen: NextRun, often: NextRun | None, sure: NextRun | None) -> str:
+    """Return how long a run would have to be: as the nearest goes on, and at least, whatever its course.
+
+    ``often`` is as often as it parts a pair, ``sure`` as often as it names the true member nearly always.
+    """
     from toolkit.diagnosis.policy import VERDICT
 
-    seconds = float(chosen.run.t[-1] - chosen.run.t[0])
-    often = search.repeated(chosen)
     why = (
         "by their own predictions the members' fits of it may end elsewhere"
         if any(predicted.lost for predicted in chosen.predicted)
@@ -169,15 +175,27 @@ def _needed(search: RunSearch, chosen: NextRun) -> str:
     said = (
         f"made again and again it parts no pair, as {why}"
         if often is None
-        else f"it would take {_long(often[0] * seconds)} of it ({often[0]} times as many rows; "
-        f"power {100 * often[1]:.0f} %)"
+        else f"it would take {_long(often.seconds)} of it ({often.times} times as many rows; "
+        f"power {100 * often.power:.0f} %)"
     )
-    if search.farthest <= 0:
-        return said
+    if sure is not None:
+        said += f", and {_long(sure.seconds)} for {100 * sure.power:.0f} %"
+    if VERDICT.close < search.farthest * chosen.seconds:
+        return said  # no more than is known: a run of that time was looked for, and parts nothing
     return (
         f"{said}, and by no course less than {_long(VERDICT.close / search.farthest)}, were every row as far "
         f"apart as the farthest of the {len(search.judged)} runs that were tried, and nothing fitted beside"
     )
+
+
+def _up(size: float) -> str:
+    """Return a number that is larger by less than a hundredth.
+
+    >>> _up(12.341), _up(120341.0)
+    ('12.4', '121000')
+    """
+    step = 10.0 ** (math.floor(math.log10(size)) - 2)
+    return f"{math.ceil(size / step) * step:.12g}"
 
 
 def _long(seconds: float) -> str:
