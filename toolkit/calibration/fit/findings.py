@@ -62,10 +62,9 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         *_model_findings(sound),
         *balance_findings(fit),
     ]
-    if fit.condition_number > COLLINEAR_FINDING:
-        message = (
-            f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
-        )
+    condition = fit.adequacy.condition_number
+    if condition > COLLINEAR_FINDING:
+        message = f"condition number {condition:.3g} of the indications, over {COLLINEAR_FINDING:g}"
         findings.append(Finding(rule="collinear", where=session.path.name, message=message))
     for load, judged in zip(fit.loads, sound.loads, strict=True):
         findings += _load_findings(load, wrong[load.setting.name])

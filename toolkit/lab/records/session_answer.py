@@ -209,9 +209,9 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
             "scatter": None if stored.scatter is None else asdict(stored.scatter),
             "residual_sd": fit.residual_sd,
             "dof": fit.dof,
-            "condition_number": candidate.fit.condition_number,
-            "condition_number_terms": candidate.fit.condition_number_terms,
-            "vif": dict(zip(record.indications, candidate.fit.vif, strict=True)),
+            "condition_number": candidate.fit.adequacy.condition_number,
+            "condition_number_terms": candidate.fit.adequacy.condition_number_terms,
+            "vif": dict(zip(record.indications, candidate.fit.adequacy.vif, strict=True)),
             "llf": load.llf,
             "check_max_percent_fs": load.check_max_percent_fs,
             "press": diagnostics.press,
@@ -272,7 +272,7 @@ def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
             f"lower limit factor {load.llf:.3g} {load.setting.unit}; {check}",
             *([stored.scatter_words] if stored.scatter_words else []),
         ]
-    lines += ["", f"condition number of the indications {candidate.fit.condition_number:.3g}"]
+    lines += ["", f"condition number of the indications {candidate.fit.adequacy.condition_number:.3g}"]
     if candidate.findings:
         lines += ["findings:", *finding_lines(candidate.findings)]
     return "\n".join(lines)
