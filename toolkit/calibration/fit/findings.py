@@ -30,9 +30,9 @@ from toolkit.calibration.fit.scatter_findings import (
 from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.fit.statement_findings import statement_findings
+from toolkit.calibration.records.record import DEFAULT_TOLERANCE
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.read import Session
-from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
 from toolkit.calibration.session.table import Table
 from toolkit.errors import SessionError
 from toolkit.findings import Finding

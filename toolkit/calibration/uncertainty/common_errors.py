@@ -36,7 +36,7 @@ import numpy as np
 from toolkit.arrays import Array
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.statements import Statements, statements_of
-from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.calibration.terms import INTERCEPT
 
 _STEP = 1e-5
 
@@ -75,7 +75,7 @@ def sensitivities(record: CalibrationRecord, load: LoadFit, points: Array) -> Ar
     at = points.T[:, None, :]
     moved = np.concatenate([at + moves, at - moves], axis=1)
     columns = dict(zip(record.indications, moved.reshape(len(steps), -1), strict=True))
-    values = (term_matrix(load.terms, columns) @ np.asarray(load.coefficients)).reshape(2, *steps.shape)
+    values = load.at(columns).reshape(2, *steps.shape)
     slopes: Array = (values[0] - values[1]) / (2 * steps)
     return slopes.T
 

@@ -201,7 +201,7 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
         fit, diagnostics, stored = load.fit, load.diagnostics, record.load(load.setting.name)
         loads[load.setting.name] = {
             "unit": load.setting.unit,
-            "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
+            "indication_units": record.units,
             "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
             "issued": dict(zip(fit.terms, stored.issued, strict=True)),
             "standard_errors": dict(zip(fit.terms, standard_errors(record, stored.load), strict=True)),
@@ -250,7 +250,7 @@ def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
     ]
     for load in candidate.fit.loads:
         stored = record.load(load.setting.name)
-        units = dict(zip(record.indications, record.indication_units, strict=True))
+        units = record.units
         rows = [
             [term, f"{c:.10g}", i, round_uncertainty(u), _per(term, load.setting.unit, units)]
             for term, c, i, u in zip(

@@ -247,7 +247,7 @@ def _load(c: Certificate, load: LoadResult) -> list[Node]:
 
 
 def _equation(c: Certificate, load: LoadResult) -> Node:
-    units = dict(zip(c.record.indications, c.record.indication_units, strict=True))
+    units = c.record.units
     lines = []
     for term in load.terms:
         coefficient_unit = dsi_of_term(load.unit, term.term, units)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
+from toolkit.calibration.terms import INTERCEPT, parse_term
 from toolkit.calibration.uncertainty.budget import calibration_budget, predict
 from toolkit.calibration.uncertainty.common_errors import standard_errors
 from toolkit.report.certificate.model import Adjustment, CheckLine, LoadResult, TermLine
@@ -67,9 +67,9 @@ def _load(
     as_left: bool,
 ) -> LoadResult:
     reference = loads.column(load.load)
-    fitted = term_matrix(load.terms, loads.columns(record.indications)) @ np.asarray(load.coefficients)
+    fitted = load.at(loads.columns(record.indications))
     residuals = fitted - reference
-    tolerance = load.tolerance or 1e-3 * load.largest
+    tolerance = load.check_tolerance
     checks = () if check is None else _checks(record, load, loads, check, rule, tolerance)
     errors = standard_errors(record, load.load)
     return LoadResult(
@@ -173,7 +173,7 @@ def _adjustment(
 def _term_unit(record: CalibrationRecord, load: LoadFit, term: str) -> str:
     if term == INTERCEPT:
         return load.unit
-    units = dict(zip(record.indications, record.indication_units, strict=True))
+    units = record.units
     parsed = parse_term(term)
     factors = [f"({units[name]})" + (f"^{power}" if power > 1 else "") for name, power in parsed.powers]
     factors += [f"({units[name]})" for name in parsed.absolutes]
