@@ -19,9 +19,13 @@ def styles_root(package: Any) -> Element | None:
     return None if part is None else part.element
 
 
-def _styles(package: Any) -> dict[str, Element]:
-    root = styles_root(package)
+def styles_by_id(root: Element | None) -> dict[str, Element]:
+    """Return the styles of a part by their ids."""
     return {} if root is None else {s.get(q("w:styleId")) or "": s for s in root.iter(q("w:style"))}
+
+
+def _styles(package: Any) -> dict[str, Element]:
+    return styles_by_id(styles_root(package))
 
 
 def _chain(identity: str, styles: dict[str, Element]) -> Iterator[Element]:
@@ -37,15 +41,16 @@ def paragraph_styles(package: Any, paragraph: Element, kind: str) -> Iterator[El
     """Yield the properties, of run or paragraph, of a paragraph's style and of those it is based on."""
     styles = _styles(package)
     default = next((name for name, style in styles.items() if _is_default(style)), "")
-    yield from _properties(style_of(paragraph) or default, styles, kind)
+    yield from properties_of(style_of(paragraph) or default, styles, kind)
 
 
 def style_chain(package: Any, identity: str | None, kind: str) -> Iterator[Element]:
     """Yield the properties of a style and of those it is based on."""
-    yield from _properties(identity or "", _styles(package), kind)
+    yield from properties_of(identity or "", _styles(package), kind)
 
 
-def _properties(identity: str, styles: dict[str, Element], kind: str) -> Iterator[Element]:
+def properties_of(identity: str, styles: dict[str, Element], kind: str) -> Iterator[Element]:
+    """Yield the properties of a style among others, and of those that it is based on."""
     for style in _chain(identity, styles):
         if (properties := style.find(kind)) is not None:
             yield properties
