@@ -21,6 +21,7 @@ def write_session(
     day: dt.date,
     *,
     span: float = 1.0,
+    checks: Sequence[float] = CHECKS,
     check_errors: Sequence[float] = (0.0, 0.0, 0.0),
     phase: str | None = None,
     zero: str = "tared",
@@ -36,11 +37,11 @@ def write_session(
         for i, force in enumerate(FORCES)
     ]
     (folder / "loads.csv").write_text("\n".join(rows) + "\n")
-    checks = [
+    check_rows = [
         f"{(span * force + error) / GAIN:.9f},{force}"
-        for force, error in zip(CHECKS, check_errors, strict=True)
+        for force, error in zip(checks, check_errors, strict=True)
     ]
-    (folder / "check.csv").write_text("\n".join(["S [mV/V],FY [N]", *checks]) + "\n")
+    (folder / "check.csv").write_text("\n".join(["S [mV/V],FY [N]", *check_rows]) + "\n")
     path = folder / "SESSION.toml"
     path.write_text(
         f'schema = 1\ninstrument = "cell"\ndate = {day.isoformat()}\noperator = "A"\nindications = ["S"]\n'

@@ -15,33 +15,18 @@ import typer
 
 from tests import commands
 from tests.built_once import built_once
+from tests.calibration.control_factory import write_session
 from toolkit.calibration.control.calibrate import calibrate
 from toolkit.calibration.registry.approval import approve
 from toolkit.calibration.registry.registry import Registry
 
 Run = Callable[..., tuple[int, Any]]
-FORCES = [100.0 * i for i in range(1, 11)]
 
 
 def session(folder: Path, year: int, error: float) -> Path:
-    """Write a session of a cell, 0.002 mV/V per N, whose check load of 450 N is off by an error [N]."""
-    folder.mkdir()
-    rows = [
-        f"{0.002 * f + 1e-6 * (-1) ** (i + run):.9f},{f},{run},up"
-        for run in (1, 2, 3)
-        for i, f in enumerate(FORCES)
-    ]
-    (folder / "loads.csv").write_text("\n".join(["S [mV/V],FY [N],run,direction", *rows]) + "\n")
-    (folder / "check.csv").write_text(f"S [mV/V],FY [N]\n{0.002 * (450 + error):.9f},450\n")
-    path = folder / "SESSION.toml"
-    path.write_text(
-        f'schema = 1\ninstrument = "cell"\ndate = {year}-03-01\noperator = "A"\nindications = ["S"]\n'
-        'loads = ["FY"]\ndata = "loads.csv"\nzero = "tared"\n[check]\nfile = "check.csv"\n'
-        "[cells.S]\nresolution = 0.0000001\n"
-        '[[polarity]]\nload = "FY"\nvalue = { value = 500, unit = "N" }\n'
-        'indications = { S = { value = 1.01, unit = "mV/V" } }\n'
-    )
-    return path
+    """Write a session of a cell whose check load of 450 N is off by an error [N]."""
+    resolution = "[cells.S]\nresolution = 0.0000001\n"
+    return write_session(folder, dt.date(year, 3, 1), checks=(450.0,), check_errors=(error,), tail=resolution)
 
 
 def _seven_years(home: Path) -> None:

@@ -401,7 +401,7 @@ def _scale(group: Group, columns: Columns, term: str) -> float:
     from toolkit.calibration.terms import evaluate, parse_term
 
     have = dict(zip(columns.names, columns.units, strict=True))
-    units = dict(zip(group.record.indications, group.record.indication_units, strict=True))
+    units = group.record.units
     ratios = {name: si_scale(have[name]) / si_scale(text) for name, text in units.items()}
     return float(evaluate(parse_term(term), ratios, 1.0))
 

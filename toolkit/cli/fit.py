@@ -71,42 +71,23 @@ def command(
     from toolkit.lab.answers import counted
     from toolkit.lab.tire_tests.convert import check_fmu, write_fit_fmu
     from toolkit.lab.tire_tests.fit_answer import fit_payload, fit_text
-    from toolkit.lab.tire_tests.fit_models import (
-        fit_options,
-        fit_recording,
-        fit_table_models,
-        fit_test_models,
-        model_choice,
-        refuse_other_files,
-        write_figures,
-    )
+    from toolkit.lab.tire_tests.fit_models import fit_order, fit_source, write_figures
     from toolkit.lab.tire_tests.tire_files import check_tir, write_fit
     from toolkit.publication import publication
     from toolkit.tires.field_file import is_field_file
     from toolkit.tires.tir_write import check_side
 
-    in_field_form = is_field_file(source)
-    names = model_choice(model or ["mf61" if (tir or fmu) is not None and in_field_form else "magic_formula"])
-    options = fit_options(loss, weights, rated_load, radius)
-    into = check_tir(tir, source, names) if tir is not None else None
-    modelled = check_fmu(fmu, source, names, fmi) if fmu is not None else None
+    over_loads = (tir is not None or fmu is not None) and is_field_file(source)
+    order = fit_order(
+        model or ["mf61" if over_loads else "magic_formula"], axes=axes, loss=loss, weights=weights,
+        rated_load_N=rated_load, radius_m=radius,
+    )  # fmt: skip
+    into = check_tir(tir, source, order.names) if tir is not None else None
+    modelled = check_fmu(fmu, source, order.names, fmi) if fmu is not None else None
     if into is not None or modelled is not None:
         check_side(side.upper())
-    if machine is not None:
-        fitted = fit_recording(
-            source, machine, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load,
-            radius_m=radius,
-        )  # fmt: skip
-    elif source.suffix.lower() != ".csv" and not in_field_form:
-        refuse_other_files(source)
-        fitted = fit_test_models(
-            source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius,
-            basis=place.basis(calibration=calibration, known_at=known_at, draft=draft),
-        )  # fmt: skip
-    else:
-        fitted = fit_table_models(
-            source, names, axes=axes, loss=options, weights=weights, rated_load_N=rated_load, radius_m=radius
-        )
+    basis = place.basis(calibration=calibration, known_at=known_at, draft=draft)
+    fitted = fit_source(source, order, machine=machine, basis=basis)
     findings = fitted.findings
     with nullcontext() if figures is None else publication(figures) as stage:
         written = [] if stage is None else write_figures(fitted, stage)

@@ -77,7 +77,7 @@ def _linear(record: CalibrationRecord, fit: LoadFit) -> tuple[float, ...]:
     if set(coefficients) - set(CELLS):
         raise _unfit(record, f"{fit.load}: terms {', '.join(fit.terms)}", "a linear equation")
     scale = si_scale(fit.unit)
-    units = dict(zip(record.indications, record.indication_units, strict=True))
+    units = record.units
     return (
         *(coefficients.get(name, 0.0) * scale / si_scale(units[name]) for name in CELLS),
         constant * scale,

@@ -77,16 +77,16 @@ def test_influence_against_statsmodels(make_session: Make) -> None:
     design = sm.add_constant(cells)
     peer = sm.OLS(load, design).fit()
     influence = OLSInfluence(peer)
-    assert report.leverage == pytest.approx(influence.hat_matrix_diag, rel=1e-6)
-    assert report.internal == pytest.approx(influence.resid_studentized_internal, rel=1e-5, abs=1e-8)
-    assert report.external == pytest.approx(influence.resid_studentized_external, rel=1e-5, abs=1e-8)
-    assert report.cook == pytest.approx(influence.cooks_distance[0], rel=1e-5, abs=1e-10)
-    assert report.press == pytest.approx(np.sqrt(np.mean(influence.resid_press**2)), rel=1e-6)
+    assert report.fit.leverage == pytest.approx(influence.hat_matrix_diag, rel=1e-6)
+    assert report.tests.internal == pytest.approx(influence.resid_studentized_internal, rel=1e-5, abs=1e-8)
+    assert report.tests.external == pytest.approx(influence.resid_studentized_external, rel=1e-5, abs=1e-8)
+    assert report.tests.cook == pytest.approx(influence.cooks_distance[0], rel=1e-5, abs=1e-10)
+    assert report.tests.press == pytest.approx(np.sqrt(np.mean(influence.resid_press**2)), rel=1e-6)
     total = np.sum((load - load.mean()) ** 2)
     assert 1 - report.predicted_r_squared == pytest.approx(np.sum(influence.resid_press**2) / total, rel=1e-5)
     assert dict(report.vif)["E5"] == pytest.approx(variance_inflation_factor(design, 3), rel=1e-6)
     spread = het_breuschpagan(peer.resid, sm.add_constant(np.abs(load)), robust=False)
-    assert report.heteroscedasticity == pytest.approx(spread[1], rel=1e-4)
+    assert report.tests.heteroscedasticity == pytest.approx(spread[1], rel=1e-4)
     half = peer.get_prediction(design[[np.argmax(np.abs(load))]]).conf_int(obs=True, alpha=0.05)[0]
     assert report.prediction_half_width == pytest.approx(np.diff(half)[0] / 2, rel=1e-6)
 
@@ -168,7 +168,7 @@ def test_an_exact_session_is_said_to_be_one(make_session: Make) -> None:
         assert (
             report.normality
             is report.lack_of_fit
-            is report.heteroscedasticity
+            is report.tests.heteroscedasticity
             is report.robust_weight
             is None
         )

@@ -71,7 +71,7 @@ def test_a_three_axis_cell_and_a_single_cell(tmp_path: Path) -> None:
     )
     (tmp_path / "S.toml").write_text(toml('["S"]', '["F"]', "cell"))
     made = run(tmp_path, tmp_path / "S.toml")
-    assert made.fit.condition_number == pytest.approx(1.0)
+    assert made.fit.adequacy.condition_number == pytest.approx(1.0)
     assert made.record.load("F").coefficients[0] == pytest.approx(-0.05, rel=1e-2)
     assert Registry(tmp_path / "cal").load("cell-r1") == made.record
 

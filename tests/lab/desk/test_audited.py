@@ -13,6 +13,7 @@ from tests.benchmarks.archive_factory import KNOWN_AT, make_archive
 from toolkit.audit.sides import disputed
 from toolkit.calibration.registry.registry import Registry
 from toolkit.errors import ToolkitError
+from toolkit.lab.archives.audit_headline import headline_of
 from toolkit.lab.desk.audited import Audited, read_audited, stamp
 from toolkit.lab.laboratory import open_laboratory
 
@@ -58,6 +59,21 @@ def test_the_first_line_counts_what_the_answer_holds(
     assert dict(audited.grades) == {
         grade: count for grade in audited.grades if (count := sum(line["grade"] == grade for line in lines))
     }
+
+
+def test_it_counts_as_the_audit_itself_does(
+    made: tuple[Path, Path, list[dict[str, Any]]], tmp_path: Path
+) -> None:
+    head, *lines = (made[0] / "audit.jsonl").read_text().splitlines()
+    small = json.loads(lines[0]) | {
+        "grade": "stale", "repair": {"FY_max_abs_N": 0.05, "MZ_max_abs_Nm": 0.001}, "sides": None
+    }  # fmt: skip
+    (tmp_path / "audit.jsonl").write_text("\n".join([head, json.dumps(small), *lines[1:]]) + "\n")
+    page, answer = read_audited(tmp_path).headline, headline_of([small, *map(json.loads, lines[1:])])
+    assert answer.small == 1
+    assert (page.wrong, page.FY_N, page.MZ_Nm) == (answer.wrong, answer.FY_N, answer.MZ_Nm)
+    assert (page.first, page.last) == (answer.first, answer.last)
+    assert page.disputed == answer.altered + answer.disputed
 
 
 def test_files_are_found_by_words_and_grades_in_an_order(

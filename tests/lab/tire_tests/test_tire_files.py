@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from toolkit.findings import Finding
-from toolkit.lab.tire_tests.fit_models import fit_table_models
+from toolkit.lab.tire_tests.fit_models import FitOrder, fit_table_models
 from toolkit.lab.tire_tests.tire_files import write_fit
 from toolkit.machine.definition import Drum
 
@@ -28,9 +28,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def told(table: Path, tir: Path, road: Drum | None, radius_m: float | None = 0.316) -> list[Finding]:
-    fitted = fit_table_models(
-        table, ["mf52"], axes="SAE", loss="linear", weights="equal", rated_load_N=None, radius_m=radius_m
-    )
+    fitted = fit_table_models(table, FitOrder(names=("mf52",), axes="SAE", radius_m=radius_m))
     findings = write_fit(
         tir, fitted.globals[0], fitted.data, source=table, side="LEFT", radius_m=radius_m, road=road
     )

@@ -45,7 +45,7 @@ def test_every_number_is_read_as_it_was_printed_and_stands_in_the_session(tmp_pa
     check_structure(root, where="certificate")
     read = certificate_of(root, where="certificate")
     assert (read.identifier, read.issued, read.calibrated) == (
-        certificate.id, certificate.issued, certificate.calibrated,
+        certificate.id, certificate.issued, certificate.statements.date,
     )  # fmt: skip
     assert set(read.items[0].numbers) == {"pair", "SA1", "SB2"}
     largest = {}
@@ -69,9 +69,11 @@ def test_every_number_is_read_as_it_was_printed_and_stands_in_the_session(tmp_pa
     text = session[:start] + '[reference]\ndcc = "standard.xml"\nstandard = "SA1"\n'
     (tmp_path / "NEXT.toml").write_text(text.replace("date = 2026-02-01", "date = 2026-03-01"))
     digital = statements_of_settings(tmp_path / "NEXT.toml")
-    words = traceability(replace(certificate, reference_digital=digital))
+    reference = replace(certificate.statements.reference, digital=digital)
+    statements = replace(certificate.statements, reference=reference)
+    words = traceability(replace(certificate, statements=statements))
     assert sha256_bytes(sealed) in words
-    assert f"by {certificate.laboratory}" in words
+    assert f"by {certificate.stated.get('laboratory')}" in words
     assert digital.signer_sha256 in words
     taken = json.loads(
         read_session(tmp_path / "NEXT.toml", standards=Standards(trust=trust())).settings

@@ -4,7 +4,9 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
+import docx
 import pytest
+from docx.enum.style import WD_STYLE_TYPE
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -47,6 +49,18 @@ def test_a_spot_in_place_of_a_figure_is_refused(tmp_path: Path, width: str, leve
         opened(tmp_path, p(f"{{{{tk:figure.gough|width={width}}}}}")), Style(), fonts=False
     )
     assert [(one.rule, one.level) for one in found] == [("figure-small", level)]
+
+
+def test_a_style_that_is_based_on_a_headings_makes_a_heading_as_the_contents_have_it(tmp_path: Path) -> None:
+    document = docx.Document()
+    own = document.styles.add_style("Chapter", WD_STYLE_TYPE.PARAGRAPH)
+    own.base_style = document.styles["Heading 1"]
+    document.add_paragraph("{{tk:figure.gough}}", style="Chapter")
+    document.save(tmp_path / "own.docx")
+    found = check_template(read_template(tmp_path / "own.docx"), Style(), fonts=False)
+    assert [one.message for one in found if one.rule == "wrong-place"] == [
+        "tk:figure.gough: a figure cannot stand in a heading"
+    ]
 
 
 @pytest.mark.parametrize("width", ["60mm", "6cm", "2.5in", "180pt"])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import random
+import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.report.template_factory import p, tbl
 from tests.report.word.test_fill import filled
-from toolkit.report.word.printed import unprinted
+from toolkit.report.word.printed import passages_of, unprinted
 
 PROSE = "The lateral force was measured at five loads and thirteen slip angles on the drum of the machine"
 
@@ -72,3 +75,30 @@ def test_in_whatever_order_cells_are_painted_none_is_lost_and_each_that_is_cut_i
     drawn.shuffle(cells)
     assert lost(tmp_path, tbl(*rows), " ".join(cells)) == []
     assert lost(tmp_path, tbl(*rows), " ".join(cells[1:])) != []
+
+
+def test_a_style_that_shows_what_its_base_hides_is_seen(tmp_path: Path) -> None:
+    styles = "".join(
+        f'<w:style w:type="paragraph" w:styleId="{name}"><w:name w:val="{name}"/>{base}'
+        f"<w:rPr>{mark}</w:rPr></w:style>"
+        for name, base, mark in (
+            ("Secret", "", "<w:vanish/>"),
+            ("Secret2", '<w:basedOn w:val="Secret"/>', ""),
+            ("Told", '<w:basedOn w:val="Secret"/>', '<w:vanish w:val="0"/>'),
+        )
+    )
+    body = "".join(
+        f'<w:p><w:pPr><w:pStyle w:val="{name}"/></w:pPr><w:r><w:t>text of {name}</w:t></w:r></w:p>'
+        for name in ("Secret", "Secret2", "Told")
+    )
+    result = filled(tmp_path, body)
+    stream = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(result.docx)) as source, zipfile.ZipFile(stream, "w") as target:
+        for name in source.namelist():
+            data = source.read(name)
+            if name == "word/styles.xml":
+                data = data.replace(b"</w:styles>", styles.encode() + b"</w:styles>")
+            target.writestr(name, data)
+    passages, _ = passages_of(replace(result, docx=stream.getvalue()), set())
+    texts = [text for passage in passages for text in passage.texts]
+    assert [text for text in texts if text.startswith("text of")] == ["text of Told"]

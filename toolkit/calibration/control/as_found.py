@@ -48,7 +48,7 @@ def errors_by(record: CalibrationRecord, table: Table, *, zero: Zero) -> dict[st
     missing = [name for name in record.indications if not table.has(name)]
     if missing:
         return f"{record.id} needs {', '.join(missing)}, which the session does not have"
-    units = dict(zip(record.indications, record.indication_units, strict=True))
+    units = record.units
     try:
         in_units = table.in_units(units)
     except UnitError as error:
@@ -320,7 +320,7 @@ def _load(
         unit=load.unit,
         reference=tuple(reference.tolist()),
         error=tuple(error.tolist()),
-        tolerance=load.tolerance or 1e-3 * load.largest,
+        tolerance=load.check_tolerance,
         full_scale=full,
         max_error=float(error[worst]),
         max_percent_fs=100 * abs(float(error[worst])) / full,

@@ -400,7 +400,7 @@ def _series(
         check_load=check_load,
         load=newest.load,
         unit=newest.unit,
-        tolerance=newest.tolerance or 1e-3 * newest.largest,
+        tolerance=newest.check_tolerance,
         points=tuple(points),
         baseline=count,
         limits=limits,

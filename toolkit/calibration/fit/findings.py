@@ -30,9 +30,9 @@ from toolkit.calibration.fit.scatter_findings import (
 from toolkit.calibration.fit.session_fit import LoadResult, SessionFit, fit_session, session_statements
 from toolkit.calibration.fit.session_rows import groups_of, mean_of
 from toolkit.calibration.fit.statement_findings import statement_findings
+from toolkit.calibration.records.record import DEFAULT_TOLERANCE
 from toolkit.calibration.session.known_errors import undeclared_standard
 from toolkit.calibration.session.read import Session
-from toolkit.calibration.session.settings import DEFAULT_TOLERANCE
 from toolkit.calibration.session.table import Table
 from toolkit.errors import SessionError
 from toolkit.findings import Finding
@@ -62,10 +62,9 @@ def session_findings(fit: SessionFit) -> tuple[Finding, ...]:
         *_model_findings(sound),
         *balance_findings(fit),
     ]
-    if fit.condition_number > COLLINEAR_FINDING:
-        message = (
-            f"condition number {fit.condition_number:.3g} of the indications, over {COLLINEAR_FINDING:g}"
-        )
+    condition = fit.adequacy.condition_number
+    if condition > COLLINEAR_FINDING:
+        message = f"condition number {condition:.3g} of the indications, over {COLLINEAR_FINDING:g}"
         findings.append(Finding(rule="collinear", where=session.path.name, message=message))
     for load, judged in zip(fit.loads, sound.loads, strict=True):
         findings += _load_findings(load, wrong[load.setting.name])

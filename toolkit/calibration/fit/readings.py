@@ -30,7 +30,6 @@ from toolkit.calibration.session.readings import (
     shunt_entry,
 )
 from toolkit.calibration.session.statements import statements_of
-from toolkit.calibration.terms import term_matrix
 from toolkit.units import unit
 
 if TYPE_CHECKING:
@@ -259,8 +258,8 @@ def _load_drift(
         start |= {} if entry.shunt else dict(entry.values)
     moved = start | {drift.name: start[drift.name] + drift.drift for drift in drifts}
     points = {name: np.array([start[name], moved[name]]) for name in record.indications}
-    before, after = _equation(load, points).tolist()
-    tolerance = load.tolerance or 1e-3 * load.largest
+    before, after = load.at(points).tolist()
+    tolerance = load.check_tolerance
     return LoadDrift(
         load=load.load, unit=load.unit, cells=tuple(drift.name for drift in drifts), drift=after - before,
         percent_fs=100 * (after - before) / load.largest, tolerance=tolerance,
@@ -350,7 +349,7 @@ def _reversibility(record: CalibrationRecord, table: Table) -> tuple[Reversibili
     columns = table.columns(record.indications)
     reversals = []
     for load, full in zip(record.loads, largest.tolist(), strict=True):
-        error = (_equation(load, columns) - table.column(load.load))[loaded]
+        error = (load.at(columns) - table.column(load.load))[loaded]
         mean_up, mean_down = (
             np.bincount(key[direction], weights=error[direction], minlength=len(ups))[paired] / count[paired]
             for direction, count in ((rises, ups), (~rises, downs))
@@ -377,8 +376,3 @@ def _levels(values: Array, within: float) -> NDArray[np.int64]:
     numbers = np.empty(len(values), dtype=np.int64)
     numbers[order] = steps
     return numbers
-
-
-def _equation(load: LoadFit, columns: dict[str, Array]) -> Array:
-    value: Array = term_matrix(load.terms, columns) @ np.asarray(load.coefficients)
-    return value

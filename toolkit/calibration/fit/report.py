@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from toolkit.calibration.fit.adequacy import Adequacy
+    from toolkit.calibration.fit.diagnostics import Diagnostics
     from toolkit.calibration.fit.regression import TermFit
     from toolkit.calibration.fit.session_fit import LoadResult, SessionFit
 
@@ -60,17 +62,14 @@ class FitReport:
     Parameters
     ----------
     load, unit, full_scale : name; unit; largest absolute reference load
-    coefficients, covariance, correlation : by term, in the order of ``coefficients``; (terms, terms)
-    n, dof, residual_sd, r_squared : rows; n - terms; [unit]; share of the load's variation explained
-    condition_number, condition_number_terms, vif : as `adequacy` defines them; ``vif`` one an indication
-    reference, fitted, residuals : [unit] (rows,); residual = reference - fitted
-    leverage, internal, external, cook : (rows,); studentised residuals by all rows, by the others alone
+    fit, tests, adequacy : the regression, what it says row by row, and what the session's rows determine
+    coefficients, correlation : by term, in the order of ``coefficients``; (terms, terms)
+    n, r_squared : rows; share of the load's variation explained
+    vif : variance inflation by indication
+    reference : [unit] (rows,)
     robust_weight : biweight (rows,), None where not judged; a small one points at the row
     direction : up, down by row, None where the file has no such column
-    press : root mean square of the leave-one-out residuals [unit]
     predicted_r_squared : 1 - sum of squared leave-one-out residuals / variation of the load
-    heteroscedasticity : Breusch-Pagan probability of scatter that does not depend on |load|; None under ten
-        rows or where the scatter is rounding
     normality : (statistic W, probability) of Shapiro and Wilk on the internal residuals, None under eight
         or over 5000 rows
     lack_of_fit : see `levels`; None without replicated levels
@@ -85,29 +84,18 @@ class FitReport:
     load: str
     unit: str
     full_scale: float
+    fit: TermFit
+    tests: Diagnostics
+    adequacy: Adequacy
     coefficients: tuple[Coefficient, ...]
-    covariance: Array
     correlation: Array
     n: int
-    dof: int
-    residual_sd: float
     r_squared: float
-    condition_number: float
-    condition_number_terms: float
     vif: tuple[tuple[str, float], ...]
     reference: Array
-    fitted: Array
-    residuals: Array
-    leverage: Array
-    internal: Array
-    external: Array
-    cook: Array
     robust_weight: Array | None
-    outliers: tuple[int, ...]
     direction: tuple[str, ...] | None
-    press: float
     predicted_r_squared: float
-    heteroscedasticity: float | None
     normality: tuple[float, float] | None
     lack_of_fit: LackOfFit | None
     levels: int
@@ -201,29 +189,18 @@ def _report(
         load=load_result.setting.name,
         unit=load_result.setting.unit,
         full_scale=full,
+        fit=solved,
+        tests=tests,
+        adequacy=fit.adequacy,
         coefficients=coefficient_rows(solved, extent, full),
-        covariance=solved.covariance,
         correlation=solved.covariance / np.outer(size, size),
         n=len(load),
-        dof=solved.dof,
-        residual_sd=solved.residual_sd,
         r_squared=1 - within / total,
-        condition_number=fit.condition_number,
-        condition_number_terms=fit.condition_number_terms,
-        vif=tuple(zip(session.indications, fit.vif, strict=True)),
+        vif=tuple(zip(session.indications, fit.adequacy.vif, strict=True)),
         reference=load,
-        fitted=load - solved.residuals,
-        residuals=solved.residuals,
-        leverage=solved.leverage,
-        internal=tests.internal,
-        external=tests.external,
-        cook=tests.cook,
         robust_weight=None if noise_free else robust_weights(solved, columns=columns, load=load),
-        outliers=tests.outliers,
         direction=table.direction,
-        press=tests.press,
         predicted_r_squared=1 - left_out / total,
-        heteroscedasticity=tests.heteroscedasticity,
         normality=None if noise_free else _normality(tests.internal),
         lack_of_fit=None if noise_free else lack_of_fit(solved, level, loading),
         levels=int(np.count_nonzero(sizes > 1)),

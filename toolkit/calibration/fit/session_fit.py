@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.arrays import Array
-from toolkit.calibration.fit.adequacy import check_adequate
+from toolkit.calibration.fit.adequacy import Adequacy, check_adequate
 from toolkit.calibration.fit.basis import build_basis
 from toolkit.calibration.fit.diagnostics import Diagnostics, diagnose, replicate_groups
 from toolkit.calibration.fit.odr import fit_odr
@@ -136,9 +136,7 @@ class SessionFit:
 
     session: Session
     loads: tuple[LoadResult, ...]
-    condition_number: float
-    condition_number_terms: float
-    vif: tuple[float, ...]
+    adequacy: Adequacy
 
 
 def fit_session(session: Session) -> SessionFit:
@@ -162,9 +160,7 @@ def fit_session(session: Session) -> SessionFit:
             _result(session, setting, fit, cells, groups)
             for setting, fit in zip(session.loads, fits, strict=True)
         ),
-        condition_number=adequacy.condition_number,
-        condition_number_terms=adequacy.condition_number_terms,
-        vif=adequacy.vif,
+        adequacy=adequacy,
     )
 
 

@@ -10,17 +10,26 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import numpy as np
 
 from toolkit.calibration.issued import issued_text
 from toolkit.calibration.records.scatter import MODELS, UNTOLD, RunScatter
+from toolkit.calibration.terms import term_matrix
 from toolkit.errors import RecordError
 from toolkit.files import parse_json, sha256_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from toolkit.arrays import Array
 
 Zero = Literal["included", "tared", "run"]
 ZEROS: tuple[Zero, ...] = ("included", "tared", "run")
 Kind = Literal["fit", "legacy"]
 SCHEMA = 1
+DEFAULT_TOLERANCE = 1e-3  # of the largest load: what check loads may be off by where nothing is stated
 ROUNDING = "equal-readings-1"  # readings of equal size share their rounding (`fit.rounding`)
 
 
@@ -91,6 +100,20 @@ class LoadFit:
         if self.minimum is None or self.maximum is None:
             return float("nan")
         return max(abs(self.minimum), abs(self.maximum))
+
+    @property
+    def check_tolerance(self) -> float:
+        """Tolerance of the check loads: as stated, else a part of the largest load; NaN without a range."""
+        return self.tolerance or DEFAULT_TOLERANCE * self.largest
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The calibrated interval: from the smallest fitted load to the largest, and zero in it."""
+        return min(self.minimum or 0.0, 0.0), max(self.maximum or 0.0, 0.0)
+
+    def at(self, columns: Mapping[str, Array]) -> Array:
+        """Return the load (rows,) at indications by name (rows,), both in the record's units."""
+        return np.asarray(term_matrix(self.terms, columns) @ np.asarray(self.coefficients))
 
     @property
     def issued_texts(self) -> tuple[str, ...]:
@@ -171,6 +194,11 @@ class CalibrationRecord:
     def indication_units(self) -> tuple[str, ...]:
         """Units of the indications, in the same order."""
         return tuple(cell.unit for cell in self.cells)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the indications by their names."""
+        return {cell.name: cell.unit for cell in self.cells}
 
     def load(self, name: str) -> LoadFit:
         """Return one load's equation.

@@ -174,9 +174,9 @@ def check_loads(record: CalibrationRecord, check: Table) -> tuple[GateResult, ..
     """Return the check loads that the record's coefficients miss by more than the tolerance."""
     failed: list[GateResult] = []
     for load in record.loads:
-        fitted = term_matrix(load.terms, check.columns(record.indications)) @ np.asarray(load.coefficients)
+        fitted = load.at(check.columns(record.indications))
         off = fitted - check.column(load.load)
-        tolerance = load.tolerance or 1e-3 * load.largest
+        tolerance = load.check_tolerance
         failed += [
             GateResult(
                 rule="check-load",
@@ -207,7 +207,7 @@ def unverifiable(
             continue
         matrix = term_matrix(load.terms, check.columns(record.indications))
         lost = _undetermined(matrix)
-        tolerance = load.tolerance or 1e-3 * load.largest
+        tolerance = load.check_tolerance
         effect = np.abs(load.coefficients) * np.ptp(matrix, axis=0)
         names += [
             f"{load.load}: {term}"

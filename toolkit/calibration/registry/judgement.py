@@ -188,7 +188,7 @@ def _predicted(record: CalibrationRecord, reading: PolarityReading, turned: str 
     applied = apply_record(
         record,
         values,
-        units=dict(zip(record.indications, record.indication_units, strict=True)),
+        units=record.units,
         tare={name: zero.get(name, 0.0) for name in record.indications} if zero else None,
         only=(reading.load,),
     )

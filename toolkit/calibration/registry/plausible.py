@@ -18,7 +18,7 @@ from toolkit.calibration.records.record import CalibrationRecord, Indication, Lo
 from toolkit.calibration.registry.gates import GateResult
 from toolkit.calibration.registry.response import largest_load, response, same_dimension, tolerance
 from toolkit.calibration.session.table import Table
-from toolkit.calibration.terms import INTERCEPT, term_matrix
+from toolkit.calibration.terms import INTERCEPT
 from toolkit.calibration.uncertainty.budget import calibration_budget
 from toolkit.calibration.uncertainty.scatter import scatter_of
 from toolkit.machine.definition import Machine
@@ -267,6 +267,6 @@ def _offsets(
 
 def _scatter(load: LoadFit, table: Table, indications: Sequence[str]) -> float:
     """Return the rows' scatter about the equation in the load's unit, robust against rows that are off."""
-    fitted = term_matrix(load.terms, table.columns(indications)) @ np.asarray(load.coefficients)
+    fitted = load.at(table.columns(indications))
     residuals = table.column(load.load) - fitted
     return _MAD * float(np.median(np.abs(residuals - np.median(residuals))))

@@ -20,7 +20,6 @@ from toolkit.calibration.terms import evaluate, parse_term, term_matrix
 from toolkit.units import unit
 
 MAIN = 0.1  # of the largest load: an indication that moves a load by more is one of its main ones
-_TOLERANCE = 1e-3  # of the largest load, where none is stated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +87,7 @@ def largest_load(load: LoadFit) -> float:
 
 def tolerance(load: LoadFit) -> float:
     """Return the check loads' tolerance in SI; NaN where the record has neither tolerance nor range."""
-    return (load.tolerance or _TOLERANCE * load.largest) * unit(load.unit).factor
+    return load.check_tolerance * unit(load.unit).factor
 
 
 def main_indications(record: CalibrationRecord, load: LoadFit) -> tuple[str, ...]:

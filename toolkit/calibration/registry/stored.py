@@ -56,7 +56,7 @@ def stored_check(registry: Path, record: CalibrationRecord) -> Table | None:
         passed=row_columns(loads, _labels(record)),
         runs=False,
     )
-    units = dict(zip(record.indications, record.indication_units, strict=True))
+    units = record.units
     mismatched = [n for n, text in units.items() if unit(table.unit(n)).dimension != unit(text).dimension]
     table = converted(table, _bridges(record, mismatched), units, where=path)
     table = table.in_units(units | {load.load: load.unit for load in record.loads})

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from toolkit.calibration.records.record import canonical
+from toolkit.calibration.records.record import DEFAULT_TOLERANCE, canonical
 from toolkit.calibration.session.session_file import CheckTable, SessionFile, session_entries
 from toolkit.calibration.terms import model_terms
 from toolkit.errors import ConfigError, ToolkitError
@@ -24,7 +24,6 @@ from toolkit.units import unit
 _ENCODER = json.JSONEncoder(
     sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False, default=str
 )
-DEFAULT_TOLERANCE = 1e-3
 _CHECK_VALUE, _CHECK_TABLE = re.compile(r"(?m)^\s*check\s*="), re.compile(r"(?m)^\s*\[\s*check\s*\]")
 _DEGREES = {"linear": 1, "balance": 2}
 

@@ -204,7 +204,7 @@ def statements_of(record: CalibrationRecord) -> Statements:
     """Return what a record's session stated; a legacy record has stated nothing."""
     return parse_statements(
         record.settings,
-        indications=dict(zip(record.indications, record.indication_units, strict=True)),
+        indications=record.units,
         loads={load.load: load.unit for load in record.loads},
         largest={load.load: load.largest for load in record.loads},
         date=dt.date.fromisoformat(record.date),

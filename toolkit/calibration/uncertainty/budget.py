@@ -22,7 +22,6 @@ from toolkit.arrays import Array
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.statements import statements_of
 from toolkit.calibration.session.table import Table
-from toolkit.calibration.terms import term_matrix
 from toolkit.calibration.uncertainty.components import components_of
 from toolkit.calibration.uncertainty.model import Budget, Contribution, Temperature
 from toolkit.calibration.uncertainty.scatter import Scatter, scatter_of
@@ -70,7 +69,7 @@ def calibration_budget(
         the record has no such load
     """
     fitted = _fitted(record, load)
-    low, high = min(fitted.minimum or 0.0, 0.0), max(fitted.maximum or 0.0, 0.0)
+    low, high = fitted.interval
     value = (high if high >= -low else low) if at is None else float(at)
     if not low <= value <= high:
         raise _refused(
@@ -107,8 +106,7 @@ def predict(
             "a finite number for each of " + ", ".join(record.indications), "give every indication once",
         )  # fmt: skip
     point = np.array([indications[name] for name in record.indications])
-    terms = term_matrix(fitted.terms, dict(zip(record.indications, point[:, None], strict=True)))
-    value = float((terms @ np.asarray(fitted.coefficients))[0])
+    value = fitted.at(dict(zip(record.indications, point[:, None], strict=True))).item()
     return Prediction(
         budget=_budget(record, loads, check, fitted, value, point, temperature, probability),
         beyond=tuple(
@@ -146,7 +144,7 @@ def expanded_of_rows(
     for start in range(0, len(indications), _AT_A_TIME):
         points = indications[start : start + _AT_A_TIME]
         columns = dict(zip(record.indications, points.T, strict=True))
-        values = term_matrix(fitted.terms, columns) @ np.asarray(fitted.coefficients)
+        values = fitted.at(columns)
         finite = np.isfinite(values)
         if finite.any():
             parts, scatter_dof = components_of(

@@ -36,8 +36,12 @@ import numpy as np
 from toolkit.arrays import Array
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.statements import Statements, statements_of
+<<<<<<< HEAD
 from toolkit.calibration.terms import INTERCEPT, term_matrix
 from toolkit.findings import Finding
+=======
+from toolkit.calibration.terms import INTERCEPT
+>>>>>>> 22a8437aeebfcd9bdbd3ec3a64077153fce7233c
 
 _STEP = 1e-5
 
@@ -76,7 +80,7 @@ def sensitivities(record: CalibrationRecord, load: LoadFit, points: Array) -> Ar
     at = points.T[:, None, :]
     moved = np.concatenate([at + moves, at - moves], axis=1)
     columns = dict(zip(record.indications, moved.reshape(len(steps), -1), strict=True))
-    values = (term_matrix(load.terms, columns) @ np.asarray(load.coefficients)).reshape(2, *steps.shape)
+    values = load.at(columns).reshape(2, *steps.shape)
     slopes: Array = (values[0] - values[1]) / (2 * steps)
     return slopes.T
 

@@ -207,9 +207,9 @@ def _interpolation(record: CalibrationRecord, s: Scatter, check: Table | None, l
         return _absent(
             "interpolation", "too few rows to tell it from scatter, and there are no check loads", "data"
         )
-    design = term_matrix(load.terms, check.columns(record.indications))
-    off = design @ np.asarray(load.coefficients) - check.column(load.load)
-    reading = s.reading(check.columns(record.indications))
+    columns = check.columns(record.indications)
+    off, design = load.at(columns) - check.column(load.load), term_matrix(load.terms, columns)
+    reading = s.reading(columns)
     expected = s.runs.within**2 * reading + quadratic(design, np.asarray(load.covariance))
     u = math.sqrt(max(float(np.mean(off**2 - expected)), 0.0))
     text = f"distance of {check.rows} check loads from the curve (rms), free of scatter and fit"

@@ -110,10 +110,8 @@ def monte_carlo(
     if not (math.isfinite(budget.U) and budget.u > 0):
         raise _refused("the budget has no interval to check", f"u = {budget.u:g}, k = {budget.k:g}", "u > 0")
     fitted = record.load(budget.load)
-    names = record.indications
-    coefficients = np.asarray(fitted.coefficients)
-    point = dict(zip(names, np.asarray(budget.indications)[:, None], strict=True))
-    value = float((term_matrix(fitted.terms, point) @ coefficients)[0])
+    point = dict(zip(record.indications, np.asarray(budget.indications)[:, None], strict=True))
+    value = fitted.at(point).item()
     draw = _model(record, loads, budget)
     delta = 0.5 * 10.0 ** last_place(budget.u, digits=digits)
     generator = np.random.default_rng(seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from toolkit.audit.model import CLEAN
 from toolkit.audit.sides import disputed
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 SMALL_FY_N, SMALL_MZ_Nm = 0.1, 0.01
 """The resolution to which changes are printed: what is smaller is no wrong value to anybody."""
+Judged = Literal[
+    "no_recording", "unreadable", "right", "altered", "disputed", "unjudged", "bare", "small", "wrong"
+]
 _CAUSES = 3  # named in the sentence; the answer holds all
 _PLACE = "\N{NARROW NO-BREAK SPACE}"
 
@@ -149,17 +152,17 @@ def headline(audit: ArchiveAudit) -> Headline:
 
 def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
     """Return the headline of the files of an audit, as its answer lists them."""
-    count = wrong = unjudged = unreadable = impossible = bare = 0
-    small = altered = open_files = no_recording = stepping = copies = 0
+    judged: Counter[Judged] = Counter()
+    impossible = stepping = copies = 0
     FY = MZ = 0.0
     largest: dict[str, str] = {}
     causes: Counter[str] = Counter()
     months: set[str] = set()
     for file in files:
-        count += 1
-        repair = file["repair"]
-        unchanged = repair is None or file["grade"] in CLEAN
+        kind, repair = judged_of(file), file["repair"]
+        judged[kind] += 1
         notes = {note["rule"] for note in file.get("notes", ())}
+<<<<<<< HEAD
         impossible += unchanged and bool(notes & {*RULES})
         if file["grade"] == "no_recording":
             no_recording += 1
@@ -180,6 +183,12 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
             small += 1
         else:
             wrong += 1
+=======
+        impossible += (repair is None or kind == "right") and bool(notes & {*RULES})
+        stepping += kind == "right" and "discontinuity" in notes
+        copies += kind == "right" and "corrected-copy" in notes
+        if kind == "wrong":
+>>>>>>> 22a8437aeebfcd9bdbd3ec3a64077153fce7233c
             cause = _cause_of(file)
             causes[cause] += 1
             if (repair["FY_max_abs_N"] or 0.0) > FY:
@@ -193,16 +202,35 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
         for cause, of in causes.most_common()
     )
     return Headline(
-        files=count, wrong=wrong, FY_N=FY, MZ_Nm=MZ, causes=counted,
-        first=min(months, default=None), last=max(months, default=None), unjudged=unjudged,
-        unreadable=unreadable, impossible=impossible, bare=bare or None, small=small, altered=altered,
-        disputed=open_files, no_recording=no_recording, stepping=stepping, copies=copies,
+        files=judged.total(), wrong=judged["wrong"], FY_N=FY, MZ_Nm=MZ, causes=counted,
+        first=min(months, default=None), last=max(months, default=None), unjudged=judged["unjudged"],
+        unreadable=judged["unreadable"], impossible=impossible, bare=judged["bare"] or None,
+        small=judged["small"], altered=judged["altered"], disputed=judged["disputed"],
+        no_recording=judged["no_recording"], stepping=stepping, copies=copies,
     )  # fmt: skip
 
 
-def _is_small(repair: Mapping[str, Any]) -> bool:
-    FY, MZ = repair["FY_max_abs_N"] or 0.0, repair["MZ_max_abs_Nm"] or 0.0
-    return max(FY / SMALL_FY_N, MZ / SMALL_MZ_Nm) < 1.0
+def judged_of(file: Mapping[str, Any]) -> Judged:
+    """Return what a file of an audit is, by its line of the answer: the one rule of every list and count.
+
+    ``small``: a record that was not in force computed it, and the one in force changes less than is printed.
+    """
+    grade, repair = file["grade"], file["repair"]
+    if grade == "no_recording" or grade == "unreadable":
+        return grade  # type: ignore[no-any-return]
+    if grade in CLEAN:
+        return "right"
+    if grade == "altered_cells":
+        return "altered"
+    if disputed(file):
+        return "disputed"
+    if repair is None:
+        return "unjudged"
+    FY, MZ = repair["FY_max_abs_N"], repair["MZ_max_abs_Nm"]
+    if FY is None and MZ is None:
+        return "bare"
+    is_small = max((FY or 0.0) / SMALL_FY_N, (MZ or 0.0) / SMALL_MZ_Nm) < 1.0
+    return "small" if grade == "stale" and is_small else "wrong"
 
 
 def _cause_of(file: Mapping[str, Any]) -> str:

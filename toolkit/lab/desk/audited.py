@@ -15,12 +15,12 @@ from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
-from toolkit.audit.model import CLEAN, GRADES
-from toolkit.audit.sides import disputed
+from toolkit.audit.model import GRADES
 from toolkit.days import parse_day
 from toolkit.errors import ConfigError, UnreadableError
 from toolkit.inputs import RESULT_FILE, open_regular, unreadable
 from toolkit.lab.archives.audit import LINES
+from toolkit.lab.archives.audit_headline import Judged, judged_of
 from toolkit.lab.desk.chart import Chart, row_chart
 
 if TYPE_CHECKING:
@@ -48,12 +48,17 @@ class AuditedFile:
     FY_N: float | None
     MZ_Nm: float | None
     place: int
-    is_disputed: bool = False
+    judged: Judged
 
     @property
     def is_wrong(self) -> bool:
         """Whether the record in force makes other numbers of its cells."""
-        return self.grade not in CLEAN and not self.is_disputed and bool(self.FY_N or self.MZ_Nm)
+        return self.judged == "wrong"
+
+    @property
+    def is_disputed(self) -> bool:
+        """Whether its cells are changed, or may be."""
+        return self.judged in ("altered", "disputed")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,7 +234,7 @@ def _file(plain: Mapping[str, Any], place: int) -> AuditedFile:
         path=plain["path"], instrument=plain["instrument"], date=plain["date"], grade=plain["grade"],
         record=plain["record"], variant=plain["variant"], in_force=plain["in_force"],
         FY_N=repair["FY_max_abs_N"], MZ_Nm=repair["MZ_max_abs_Nm"], place=place,
-        is_disputed=disputed(plain),
+        judged=judged_of(plain),
     )  # fmt: skip
 
 

@@ -183,7 +183,7 @@ def _over_range(
     from toolkit.calibration.uncertainty.budget import calibration_budget
 
     fit = record.load(name)
-    low, high = min(fit.minimum or 0.0, 0.0), max(fit.maximum or 0.0, 0.0)
+    low, high = fit.interval
     # The ends as they are: a rounded one could lie outside the range.
     steps = [low + (high - low) * i / (RANGE_POINTS - 1) for i in range(RANGE_POINTS - 1)] + [high]
     return tuple(calibration_budget(record, rows, check, name, x, temperature=temperature) for x in steps)

@@ -142,16 +142,14 @@ def certificate_payload(
     certificate: Certificate, delivered: Delivered, sealing: Sealing | None, timing: Timing
 ) -> CertificateAnswer:
     """Return a delivered certificate as the JSON answer."""
-    record: CertifiedRecord = {
-        "id": certificate.record, "sha256": certificate.record_sha256, "status": certificate.status,
-    }  # fmt: skip
+    record = entry_of(CertifiedRecord, certificate.record, status=certificate.status.state)
     return entry_of(
         CertificateAnswer, certificate,
         certificate=certificate.id, record=record, head=certificate.ledger_head,
         **delivered_keys(delivered),
         **({"sealed_by": sealing.key.name} if sealing else {}),
         dcc=delivered.companions[0] if delivered.companions else None,
-        decision_rule=certificate.rule,
+        decision_rule=certificate.stated.rule,
         loads={load.load: _load(load) for load in certificate.loads},
         unverifiable=[f"{load}: {term}" for load, term in certificate.unverifiable],
         not_stated=certificate.gaps,
@@ -172,7 +170,7 @@ def certificate_text(certificate: Certificate, delivered: Delivered, sealing: Se
     """Return a delivered certificate for people."""
     marks = "  DRAFT" if certificate.draft else "  WITHDRAWN" if certificate.withdrawn else ""
     lines = [
-        f"certificate {certificate.id} of {certificate.record}{marks}",
+        f"certificate {certificate.id} of {certificate.record.id}{marks}",
         *(one_line(path) for path in (delivered.pdf, delivered.docx, *delivered.companions)),
         f"{delivered.pages} pages, {len(delivered.filled.manifest)} values verified",
         f"signature: {delivered.signature}",

@@ -52,7 +52,7 @@ class Record(Face):
     @property
     def indications(self) -> dict[str, str]:
         """The indications that it needs, with their units."""
-        return dict(zip(self.result.indications, self.result.indication_units, strict=True))
+        return self.result.units
 
     @property
     def loads(self) -> dict[str, str]:

@@ -366,7 +366,7 @@ def _described(record: CalibrationRecord, registry: Path) -> tuple[RecordContent
     lines += ["", *(f"{d.role:<9}{d.file}  {d.sha256[:12]}" for d in record.data)]
     payload: RecordContent = {
         "zero": record.zero,
-        "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
+        "indication_units": record.units,
         "indications": cells,
         "loads": loads,
         "data": data,
@@ -392,18 +392,12 @@ def _figures(fit: LoadFit, miss: float | None) -> list[str]:
 
 def _check_misses(record: CalibrationRecord, registry: Path) -> dict[str, float]:
     from toolkit.calibration.registry.stored import stored_check
-    from toolkit.calibration.terms import term_matrix
 
     check = stored_check(registry, record)
     if check is None:
         return {}
     columns = check.columns(record.indications)
-    return {
-        load.load: float(
-            abs(term_matrix(load.terms, columns) @ load.coefficients - check.column(load.load)).max()
-        )
-        for load in record.loads
-    }
+    return {load.load: float(abs(load.at(columns) - check.column(load.load)).max()) for load in record.loads}
 
 
 def _range(low: float | None, high: float | None, unit: str) -> str:

@@ -201,7 +201,7 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
         fit, diagnostics, stored = load.fit, load.diagnostics, record.load(load.setting.name)
         loads[load.setting.name] = {
             "unit": load.setting.unit,
-            "indication_units": dict(zip(record.indications, record.indication_units, strict=True)),
+            "indication_units": record.units,
             "coefficients": dict(zip(fit.terms, fit.coefficients, strict=True)),
             "issued": dict(zip(fit.terms, stored.issued, strict=True)),
             "standard_errors": dict(zip(fit.terms, standard_errors(record, stored.load), strict=True)),
@@ -209,9 +209,9 @@ def candidate_payload(candidate: Candidate, status: str, signature: str) -> Fitt
             "scatter": None if stored.scatter is None else asdict(stored.scatter),
             "residual_sd": fit.residual_sd,
             "dof": fit.dof,
-            "condition_number": candidate.fit.condition_number,
-            "condition_number_terms": candidate.fit.condition_number_terms,
-            "vif": dict(zip(record.indications, candidate.fit.vif, strict=True)),
+            "condition_number": candidate.fit.adequacy.condition_number,
+            "condition_number_terms": candidate.fit.adequacy.condition_number_terms,
+            "vif": dict(zip(record.indications, candidate.fit.adequacy.vif, strict=True)),
             "llf": load.llf,
             "check_max_percent_fs": load.check_max_percent_fs,
             "press": diagnostics.press,
@@ -250,7 +250,7 @@ def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
     ]
     for load in candidate.fit.loads:
         stored = record.load(load.setting.name)
-        units = dict(zip(record.indications, record.indication_units, strict=True))
+        units = record.units
         rows = [
             [term, f"{c:.10g}", i, round_uncertainty(u), _per(term, load.setting.unit, units)]
             for term, c, i, u in zip(
@@ -272,7 +272,7 @@ def candidate_text(candidate: Candidate, status: str, signature: str) -> str:
             f"lower limit factor {load.llf:.3g} {load.setting.unit}; {check}",
             *([stored.scatter_words] if stored.scatter_words else []),
         ]
-    lines += ["", f"condition number of the indications {candidate.fit.condition_number:.3g}"]
+    lines += ["", f"condition number of the indications {candidate.fit.adequacy.condition_number:.3g}"]
     if candidate.findings:
         lines += ["findings:", *finding_lines(candidate.findings)]
     return "\n".join(lines)

@@ -45,20 +45,83 @@ class Fitted:
     road: Drum | None = None
 
 
-def fit_table_models(
-    table: Path | TireTable,
-    names: Sequence[str],
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitOrder:
+    """What is fitted, and how: ``names`` of models, the ``loss`` of their rows, the ``weights`` of the loads.
+
+    ``axes`` are those of a table's numbers, None for its own: SAE, of a file of the field by the sign of the
+    load. ``rated_load_N`` and ``radius_m`` are of the tire, where the source does not tell them.
+    """
+
+    names: tuple[str, ...]
+    axes: str | None = None
+    loss: Loss = "linear"
+    weights: str = "equal"
+    rated_load_N: float | None = None
+    radius_m: float | None = None
+
+
+def fit_order(
+    models: Sequence[str],
     *,
-    axes: str | None,
-    loss: Loss,
-    weights: str,
-    rated_load_N: float | None,
-    radius_m: float | None,
-) -> Fitted:
+    axes: str | None = None,
+    loss: str = "linear",
+    weights: str = "equal",
+    rated_load_N: float | None = None,
+    radius_m: float | None = None,
+) -> FitOrder:
+    """Return an order as it was stated; refuse what no fit can use before anything is read.
+
+    Raises
+    ------
+    ConfigError
+        a loss or a weighting is unknown; a load [N] or a radius [m] is no positive number
+    FitError
+        no model of a name is built
+    """
+    import math
+
+    from toolkit.tires.global_fit import WEIGHTS
+    from toolkit.tires.model import LOSSES
+
+    names = model_choice(models)
+    for name, choice, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
+        refuse_unknown(name, choice, choices, where=f"--{name}", rule=f"unknown-{name}")
+    for option, value, unit in (("--rated-load", rated_load_N, "N"), ("--radius", radius_m, "m")):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise ConfigError(
+                f"{option} is no positive number", where=option, got=value,
+                expected=f"a number of {unit} above 0", next_step="mend the option", rule="wrong-value",
+            )  # fmt: skip
+    return FitOrder(
+        names=names, axes=axes, loss="robust" if loss == "robust" else "linear", weights=weights,
+        rated_load_N=rated_load_N, radius_m=radius_m,
+    )  # fmt: skip
+
+
+def fit_source(source: Path, order: FitOrder, *, machine: str | None, basis: Basis) -> Fitted:
+    """Return the fits of a file or folder: of a machine's recording, of a test by ``basis``, of a table.
+
+    Raises
+    ------
+    ConfigError
+        ``fit-source``: a file of another kind; errors as those of `fit_recording`, `fit_test_models` and
+        `fit_table_models`
+    """
+    from toolkit.tires.field_file import is_field_file
+
+    if machine is not None:
+        return fit_recording(source, machine, order)
+    if source.suffix.lower() != ".csv" and not is_field_file(source):
+        refuse_other_files(source)
+        return fit_test_models(source, order, basis)
+    return fit_table_models(source, order)
+
+
+def fit_table_models(table: Path | TireTable, order: FitOrder) -> Fitted:
     """Return the fits of a table, or of a file of the field, which is split by condition and direction.
 
     ``table`` is its path, or what a notebook gave in place of a file.
-    ``axes`` are None for those of the file: SAE for a table, by the sign of the load for a file of the field.
 
     Raises
     ------
@@ -74,36 +137,36 @@ def fit_table_models(
     from toolkit.tires.table_fit import axes_findings, fit_table, repeat_findings, row_findings
 
     path = table if isinstance(table, Path) else table.path
-    sweeps = split_file(table, axes) if isinstance(table, Path) and is_field_file(table) else None
+    sweeps = split_file(table, order.axes) if isinstance(table, Path) and is_field_file(table) else None
     if sweeps is not None:
         measured = sweeps.table
     else:
-        measured = read_table(table, axes=axes or "SAE") if isinstance(table, Path) else table
-    data = of_table(measured, rated_load_N=rated_load_N, radius_m=radius_m or STAND_IN_RADIUS)
-    single, over_loads = _split(names)
+        measured = read_table(table, axes=order.axes or "SAE") if isinstance(table, Path) else table
+    data = of_table(measured, rated_load_N=order.rated_load_N, radius_m=order.radius_m or STAND_IN_RADIUS)
+    single, over_loads = _split(order.names)
     curves: tuple[CurveFit, ...] = ()
     findings: tuple[Finding, ...] = (*measured.mark_findings, *repeat_findings(measured))
     seconds: dict[str, float] = {}
     for model in single:
         started = time.perf_counter()
-        result = fit_table(measured, model, loss=loss)
+        result = fit_table(measured, model, loss=order.loss)
         seconds[model.name] = time.perf_counter() - started
         curves += result.fits
         findings += tuple(finding for finding in result.findings if finding not in findings)
-    fits, fit_findings, seeds = _global(data, over_loads, loss, weights, str(path), seconds)
+    fits, fit_findings, seeds = _global(data, over_loads, order, str(path), seconds)
     if not single:
         findings += (
             *row_findings(measured),
             *axes_findings(measured, seeds),
             *size_findings(seeds, path.name),
         )
-    fitted = _fitted(data, curves, (None,) * len(curves), fits, (*findings, *fit_findings), radius_m, seconds)
-    return replace(fitted, sweeps=sweeps)
+    return _fitted(
+        data, [(fit, None) for fit in curves], fits, seconds,
+        findings=(*findings, *fit_findings), radius_m=order.radius_m, sweeps=sweeps,
+    )  # fmt: skip
 
 
-def fit_recording(
-    path: Path, machine: str, names: Sequence[str], *, axes: str | None, **options: Any
-) -> Fitted:
+def fit_recording(path: Path, machine: str, order: FitOrder) -> Fitted:
     """Return the fits of a machine's recording by its own forces; ``machine`` is a name or a definition.
 
     Raises
@@ -114,14 +177,13 @@ def fit_recording(
     from toolkit.machine import load_machine
 
     definition = load_machine(machine)
-    if axes is not None:
+    if order.axes is not None:
         raise ConfigError(
-            "a recording is in the axes of its machine", where="--axes", got=axes,
+            "a recording is in the axes of its machine", where="--axes", got=order.axes,
             expected=f"--machine alone; its axes are {definition.axes}", next_step="leave --axes out",
             rule="usage",
         )  # fmt: skip
-    fitted = fit_table_models(_table_of_recording(path, definition), names, axes=None, **options)
-    return replace(fitted, road=definition.drum)
+    return replace(fit_table_models(_table_of_recording(path, definition), order), road=definition.drum)
 
 
 def _table_of_recording(path: Path, machine: Machine) -> TireTable:
@@ -174,17 +236,7 @@ def refuse_other_files(source: Path) -> None:
         )  # fmt: skip
 
 
-def fit_test_models(
-    test: Path,
-    names: Sequence[str],
-    *,
-    axes: str | None,
-    loss: Loss,
-    weights: str,
-    rated_load_N: float | None,
-    radius_m: float | None,
-    basis: Basis,
-) -> Fitted:
+def fit_test_models(test: Path, order: FitOrder, basis: Basis) -> Fitted:
     """Return the fits of a test: single loads in both directions, models over all loads of the forward run.
 
     Raises
@@ -194,27 +246,15 @@ def fit_test_models(
     """
     from toolkit.lab.tire_tests.resolve import resolve_test
 
-    if axes not in (None, "SAE"):
+    if order.axes not in (None, "SAE"):
         raise ConfigError(
-            "a test is reduced to SAE axes", where="--axes", got=axes, expected="SAE for a test",
+            "a test is reduced to SAE axes", where="--axes", got=order.axes, expected="SAE for a test",
             next_step="leave --axes away; it declares the axes of a table", rule="axes-of-test",
         )  # fmt: skip
-    return fit_resolved(
-        resolve_test(test, basis), names, where=str(test), loss=loss, weights=weights,
-        rated_load_N=rated_load_N, radius_m=radius_m,
-    )  # fmt: skip
+    return fit_resolved(resolve_test(test, basis), order, where=str(test))
 
 
-def fit_resolved(
-    resolved: Resolved,
-    names: Sequence[str],
-    *,
-    where: str,
-    loss: Loss = "linear",
-    weights: str = "equal",
-    rated_load_N: float | None = None,
-    radius_m: float | None = None,
-) -> Fitted:
+def fit_resolved(resolved: Resolved, order: FitOrder, *, where: str) -> Fitted:
     """Return the fits of a test that was read already; ``where`` names it.
 
     Raises
@@ -224,59 +264,48 @@ def fit_resolved(
     """
     import numpy as np
 
-    from toolkit.characteristics.groups import group
-    from toolkit.lab.tire_tests.tire_files import STAND_IN_RADIUS
+    from toolkit.characteristics.groups import CHANNELS, group
+    from toolkit.lab.tire_tests.tire_files import STAND_IN_RADIUS, columns_of_run
     from toolkit.reduction.averaging import free_radius_m
     from toolkit.tires.fit import Curve, why_not
     from toolkit.tires.global_data import measured
     from toolkit.tires.models import fit_model
     from toolkit.tires.table_fit import fit_findings
 
-    groups = group(resolved.result.reduced)
-    single, over_loads = _split(names)
-    rows: list[tuple[CurveFit, str]] = []
+    reduced = resolved.result.reduced
+    groups, info = group(reduced), reduced.info
+    single, over_loads = _split(order.names)
+    curves: list[tuple[CurveFit, str | None]] = []
     seconds: dict[str, float] = {}
     for model in single:
-        curves = [
+        measured_curves = [
             (Curve(SA=g.SA, y=g.values(channel), channel=channel, load_N=g.load_N), g.rotation)
             for g in groups
-            for channel in ("FY", "MZ")
+            for channel in CHANNELS
         ]
-        curves = [(curve, rotation) for curve, rotation in curves if why_not(curve) is None]
+        fitting = [(curve, rotation) for curve, rotation in measured_curves if why_not(curve) is None]
         started = time.perf_counter()
-        fits = fit_model(model, [curve for curve, _ in curves], loss=loss)
+        fits = fit_model(model, [curve for curve, _ in fitting], loss=order.loss)
         seconds[model.name] = time.perf_counter() - started
-        rows += list(zip(fits, [rotation for _, rotation in curves], strict=True))
-    notes = [finding for finding in fit_findings([fit for fit, _ in rows]) if finding.level == "note"]
-    info = resolved.result.reduced.info
-    radius = radius_m or free_radius_m(info.tire_size)
-    run = [
-        g
-        for g in groups
-        if g.rotation == ("forward" if any(g.rotation == "forward" for g in groups) else g.rotation)
-    ]
-    columns = {
-        "SA": np.concatenate([g.SA for g in run]),
-        "FZ": np.concatenate([np.full(len(g.SA), g.load_N) for g in run]),
-        "FY": np.concatenate([g.values("FY") for g in run]),
-        "MZ": np.concatenate([g.values("MZ") for g in run]),
-    }
+        curves += list(zip(fits, [rotation for _, rotation in fitting], strict=True))
+    notes = [finding for finding in fit_findings([fit for fit, _ in curves]) if finding.level == "note"]
+    radius = order.radius_m or free_radius_m(info.tire_size)
+    forward = [g for g in groups if g.rotation == "forward"]
+    columns = columns_of_run(forward or groups)
     if info.pressure_Pa:
         columns["P"] = np.full(len(columns["SA"]), info.pressure_Pa)
     if info.speed_m_s:
         columns["V"] = np.full(len(columns["SA"]), info.speed_m_s)
     data = measured(
-        columns, axes="SAE", rated_load_N=rated_load_N or info.rated_load_N,
+        columns, axes="SAE", rated_load_N=order.rated_load_N or info.rated_load_N,
         unloaded_radius_m=radius or STAND_IN_RADIUS,
     )  # fmt: skip
-    fits_all, global_findings, _ = _global(data, over_loads, loss, weights, where, seconds)
-    findings = (*resolved.findings, *notes, *global_findings)
-    fitted = _fitted(
-        data, tuple(fit for fit, _ in rows), tuple(turn for _, turn in rows), fits_all, findings, radius,
-        seconds,
-    )  # fmt: skip
+    model_fits, global_findings, _ = _global(data, over_loads, order, where, seconds)
     roads = [recording.machine.drum for _, recording in resolved.recordings]
-    return replace(fitted, use=resolved.result.reduced.calibration, road=roads[0] if roads else None)
+    return _fitted(
+        data, curves, model_fits, seconds, findings=(*resolved.findings, *notes, *global_findings),
+        radius_m=radius, use=reduced.calibration, road=roads[0] if roads else None,
+    )  # fmt: skip
 
 
 def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalModel, ...]]:
@@ -289,12 +318,7 @@ def _split(names: Sequence[str]) -> tuple[tuple[TireModel, ...], tuple[GlobalMod
 
 
 def _global(
-    data: Measured,
-    models: Sequence[GlobalModel],
-    loss: Loss,
-    weights: str,
-    where: str,
-    seconds: dict[str, float],
+    data: Measured, models: Sequence[GlobalModel], order: FitOrder, where: str, seconds: dict[str, float]
 ) -> tuple[tuple[ModelFit, ...], tuple[Finding, ...], tuple[CurveFit, ...]]:
     from toolkit.tires.global_fit import fit_global, global_findings, not_varied, selection_of
     from toolkit.tires.global_seeds import seeds_of, why_not_global
@@ -315,7 +339,7 @@ def _global(
     for model, all_rows in zip(models, whole, strict=True):
         started = time.perf_counter()
         known = seeds.seeds if all_rows else None
-        model_fits.append(fit_global(model, data, loss=loss, weights=weights, seeds=known))
+        model_fits.append(fit_global(model, data, loss=order.loss, weights=order.weights, seeds=known))
         seconds[model.name] = time.perf_counter() - started
     fits = tuple(model_fits)
     findings = [*_apart(fits, where), *not_varied(fits, where)]
@@ -337,25 +361,19 @@ def _apart(fits: Sequence[ModelFit], where: str) -> list[Finding]:
 
 def _fitted(
     data: Measured,
-    curves: tuple[CurveFit, ...],
-    rotations: tuple[str | None, ...],
+    curves: Sequence[tuple[CurveFit, str | None]],
     fits: tuple[ModelFit, ...],
-    findings: tuple[Finding, ...],
-    radius_m: float | None,
     seconds: dict[str, float],
+    **known: Any,
 ) -> Fitted:
+    """Return what was fitted, with the comparison of all; ``curves`` with the direction of their runs."""
     from toolkit.tires.comparison import compare
 
-    forward = [fit for fit, turn in zip(curves, rotations, strict=True) if turn in (None, "forward")]
+    forward = [fit for fit, turn in curves if turn in (None, "forward")]
     return Fitted(
-        data=data,
-        curves=curves,
-        rotations=rotations,
-        globals=fits,
-        comparison=compare(data, forward, fits, seconds=seconds),
-        findings=findings,
-        radius_m=radius_m,
-    )
+        data=data, curves=tuple(fit for fit, _ in curves), rotations=tuple(turn for _, turn in curves),
+        globals=fits, comparison=compare(data, forward, fits, seconds=seconds), **known,
+    )  # fmt: skip
 
 
 def model_choice(choices: Sequence[str]) -> tuple[str, ...]:
@@ -372,30 +390,6 @@ def model_choice(choices: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         find(name)
     return tuple(dict.fromkeys(names))
-
-
-def fit_options(loss: str, weights: str, rated_load: float | None, radius: float | None) -> Loss:
-    """Return the loss that is named; refuse options that no fit can use.
-
-    Raises
-    ------
-    ConfigError
-        a loss or a weighting is unknown; a load [N] or a radius [m] is no positive number
-    """
-    import math
-
-    from toolkit.tires.global_fit import WEIGHTS
-    from toolkit.tires.model import LOSSES
-
-    for name, choice, choices in (("loss", loss, LOSSES), ("weights", weights, WEIGHTS)):
-        refuse_unknown(name, choice, choices, where=f"--{name}", rule=f"unknown-{name}")
-    for option, value, unit in (("--rated-load", rated_load, "N"), ("--radius", radius, "m")):
-        if value is not None and not (math.isfinite(value) and value > 0):
-            raise ConfigError(
-                f"{option} is no positive number", where=option, got=value,
-                expected=f"a number of {unit} above 0", next_step="mend the option", rule="wrong-value",
-            )  # fmt: skip
-    return "robust" if loss == "robust" else "linear"
 
 
 def write_figures(fitted: Fitted, stage: Path) -> list[str]:

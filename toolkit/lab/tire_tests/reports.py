@@ -222,11 +222,11 @@ def _folder(resolved: Resolved, out: Path | None, *, alone: bool, taken: set[Pat
 
 def _compared(test: Path, resolved: Resolved, models: tuple[str, ...]) -> tuple[Resolved, Comparison | None]:
     """Return the models side by side, and the test with what was found of their fits but mere notes."""
-    from toolkit.lab.tire_tests.fit_models import fit_resolved
+    from toolkit.lab.tire_tests.fit_models import FitOrder, fit_resolved
 
     if not models:
         return resolved, None
-    fitted = fit_resolved(resolved, models, where=str(test))
+    fitted = fit_resolved(resolved, FitOrder(names=models), where=str(test))
     fit_findings = [
         finding for finding in fitted.findings if finding.level != "note" and finding not in resolved.findings
     ]

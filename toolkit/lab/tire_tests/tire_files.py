@@ -12,8 +12,10 @@ from toolkit.files import same_file
 from toolkit.findings import Finding
 
 if TYPE_CHECKING:
+    from toolkit.arrays import Array
     from toolkit.calibration.records.use import CalibrationUse
     from toolkit.channels import Rotation
+    from toolkit.characteristics.groups import Group
     from toolkit.machine.definition import Drum
     from toolkit.reduction.model import ReducedTest
     from toolkit.tires.global_data import Measured
@@ -158,6 +160,17 @@ class HandedTire:
         )
 
 
+def columns_of_run(run: Sequence[Group]) -> dict[str, Array]:
+    """Return the conditions of a run as columns of a table, each load at its common value."""
+    import numpy as np
+
+    return {
+        "SA": np.concatenate([block.SA for block in run]),
+        "FZ": np.concatenate([np.full(len(block.SA), block.load_N) for block in run]),
+        **{name: np.concatenate([block.values(name) for block in run]) for name in ("FY", "MZ")},
+    }
+
+
 def fit_test_tire(reduced: ReducedTest) -> HandedTire:
     """Return MF 6.1 over all loads of a test's first direction.
 
@@ -168,8 +181,6 @@ def fit_test_tire(reduced: ReducedTest) -> HandedTire:
     FitError
         the test states no tire size, or has one load
     """
-    import numpy as np
-
     from toolkit.characteristics.groups import group
     from toolkit.reduction.averaging import free_radius_m
     from toolkit.tires.global_data import measured, what_varies
@@ -180,11 +191,7 @@ def fit_test_tire(reduced: ReducedTest) -> HandedTire:
     run = [block for block in groups if block.rotation == groups[0].rotation]
     radius = free_radius_m(reduced.info.tire_size)
     data = measured(
-        {
-            "SA": np.concatenate([block.SA for block in run]),
-            "FZ": np.concatenate([np.full(len(block.SA), block.load_N) for block in run]),
-            **{name: np.concatenate([block.values(name) for block in run]) for name in ("FY", "MZ")},
-        },
+        columns_of_run(run),
         axes="SAE",
         rated_load_N=reduced.info.rated_load_N,
         unloaded_radius_m=radius or STAND_IN_RADIUS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from toolkit.lab.answers import counted
 from toolkit.lab.arguments import checked
@@ -243,23 +243,21 @@ def fit_tire(
     ToolkitError
         the source cannot be read, or a model cannot be fitted to it
     """
-    from toolkit.lab.tire_tests.fit_models import fit_options, fit_resolved, fit_table_models, model_choice
+    from toolkit.lab.tire_tests.fit_models import fit_order, fit_resolved, fit_table_models
     from toolkit.lab.tire_tests.resolve import Resolved
 
-    names = model_choice(models or ("magic_formula",))
-    fit_options(loss, weights, rated_load_N, radius_m)
-    options: dict[str, Any] = {
-        "loss": loss, "weights": weights, "rated_load_N": rated_load_N, "radius_m": radius_m
-    }  # fmt: skip
+    order = fit_order(
+        models or ("magic_formula",), axes=axes, loss=loss, weights=weights, rated_load_N=rated_load_N,
+        radius_m=radius_m,
+    )  # fmt: skip
     resolved = source if isinstance(source, Resolved) else getattr(source, "result", None)
     if isinstance(resolved, Resolved):
         name = resolved.result.reduced.info.name
-        return TireFit(result=fit_resolved(resolved, names, where=name, **options), source=name)
+        return TireFit(result=fit_resolved(resolved, order, where=name), source=name)
     if isinstance(source, str | Path):
-        fitted = fit_table_models(Path(source), names, axes=axes, **options)
-        return TireFit(result=fitted, source=str(source))
+        return TireFit(result=fit_table_models(Path(source), order), source=str(source))
     table = tire_table(source, units=units, axes=axes or "SAE")  # type: ignore[arg-type]
-    return TireFit(result=fit_table_models(table, names, axes=axes, **options), source=str(table.path))
+    return TireFit(result=fit_table_models(table, order), source=str(table.path))
 
 
 @checked

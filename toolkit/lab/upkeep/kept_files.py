@@ -156,8 +156,18 @@ def _of_record(path: Path) -> tuple[Version, str | None]:
 @cache
 def kinds() -> tuple[Kind, ...]:
     """Return the kinds of files that lie in a home beside its registry."""
+    from toolkit.diagnosis.answer.reader import read_answer
+    from toolkit.diagnosis.case.reader import read_case
     from toolkit.lab.desk.jobs import FILE as JOB
     from toolkit.lab.desk.jobs import FOLDER as JOBS
+    from toolkit.lab.desk.jobs import read_job
+    from toolkit.lab.desk.kept_plans import read_plan
+    from toolkit.lab.tire_tests.watching import WatchState
+    from toolkit.recording.folder import StatedTest
+    from toolkit.report.style import read_style
+    from toolkit.report.word.package import read_template
+    from toolkit.simulation.model_file import read_model
+    from toolkit.testfile.read import read_test_file
 
     shipped = partial(
         Kind, folder=TEMPLATES, version=_release,
@@ -166,17 +176,22 @@ def kinds() -> tuple[Kind, ...]:
     settings = partial(Kind, version=_schema_of_toml)
     result = partial(Kind, form=RESULT_FILE, version=_schema_of_json)
     return (
-        shipped(title="template", names=("*.docx",), read=_read_template, form=TEMPLATE_FILE),
-        shipped(title="style file", names=("*.toml",), read=_read_style),
-        settings(title="job", names=(JOB,), folder=JOBS, read=_read_job),
-        settings(title="test", names=("test.toml",), read=_read_test),
-        settings(title="case", names=("case.toml", "CASE.toml"), read=_read_case),
-        settings(title="model", names=("model.toml",), read=_read_model),
-        result(title="diagnosis", names=("diagnosis.json",), read=_read_diagnosis),
-        result(title="plan", names=("plan.json",), read=_read_plan),
+        shipped(title="template", names=("*.docx",), read=_silent(read_template), form=TEMPLATE_FILE),
+        shipped(title="style file", names=("*.toml",), read=_silent(read_style)),
+        settings(title="job", names=(JOB,), folder=JOBS, read=_silent(lambda path: read_job(path.parent))),
+        settings(title="test", names=("test.toml",), read=_declared(StatedTest, SETTINGS_FILE)),
+        settings(title="case", names=("case.toml", "CASE.toml"), read=_silent(read_case)),
+        settings(title="model", names=("model.toml",), read=lambda path: read_model(path).code_version),
+        result(title="diagnosis", names=("diagnosis.json",), read=_silent(read_answer)),
+        result(title="plan", names=("plan.json",), read=_silent(lambda path: read_plan(path.parent))),
         result(title="manifest", names=("manifest.json",), read=_read_manifest),
-        result(title="watch", names=("watch.json",), read=_read_watch),
-        result(title=_REDUCED, names=("*.xlsx",), version=lambda *_: 1, read=_read_reduced),
+        result(title="watch", names=("watch.json",), read=_declared(WatchState, RESULT_FILE)),
+        result(
+            title=_REDUCED,
+            names=("*.xlsx",),
+            version=lambda *_: 1,
+            read=lambda path: read_test_file(path).reduced.code_version,
+        ),
     )
 
 
@@ -222,74 +237,19 @@ def _todays(name: str, _data: bytes) -> bytes:
     return (packaged_home() / TEMPLATES / name).read_bytes()
 
 
-def _read_template(path: Path) -> str | None:
-    from toolkit.report.word.package import read_template
+def _silent(read: Callable[[Path], object]) -> Callable[[Path], str | None]:
+    """Return the reader of a file that does not say which version of the toolkit wrote it."""
 
-    read_template(path)
-    return None
+    def read_whole(path: Path) -> None:
+        read(path)
 
-
-def _read_style(path: Path) -> str | None:
-    from toolkit.report.style import read_style
-
-    read_style(path)
-    return None
+    return read_whole
 
 
-def _read_job(path: Path) -> str | None:
-    from toolkit.lab.desk.jobs import read_job
-
-    read_job(path.parent)
-    return None
-
-
-def _read_test(path: Path) -> str | None:
-    from toolkit.recording.folder import StatedTest
-
-    read_text(StatedTest, read_input(path, SETTINGS_FILE), where=path)
-    return None
-
-
-def _read_case(path: Path) -> str | None:
-    from toolkit.diagnosis.case.reader import read_case
-
-    read_case(path)
-    return None
-
-
-def _read_model(path: Path) -> str | None:
-    from toolkit.simulation.model_file import read_model
-
-    return read_model(path).code_version
-
-
-def _read_diagnosis(path: Path) -> str | None:
-    from toolkit.diagnosis.answer.reader import read_answer
-
-    read_answer(path)
-    return None
-
-
-def _read_plan(path: Path) -> str | None:
-    from toolkit.lab.desk.kept_plans import read_plan
-
-    read_plan(path.parent)
-    return None
+def _declared(cls: type, form: Form) -> Callable[[Path], str | None]:
+    return _silent(lambda path: read_text(cls, read_input(path, form), where=path))
 
 
 def _read_manifest(path: Path) -> str | None:
     software = json.loads(read_input(path, RESULT_FILE)).get("software", {})
     return software.get("toolkit") if isinstance(software, dict) else None
-
-
-def _read_watch(path: Path) -> str | None:
-    from toolkit.lab.tire_tests.watching import WatchState
-
-    read_text(WatchState, read_input(path, RESULT_FILE), where=path)
-    return None
-
-
-def _read_reduced(path: Path) -> str | None:
-    from toolkit.testfile.read import read_test_file
-
-    return read_test_file(path).reduced.code_version

@@ -50,9 +50,10 @@ def open_figures(report: FitReport, *, title: str) -> dict[str, Callable[[], Fig
 
 
 def _drawings(report: FitReport) -> dict[str, tuple[Callable[[Axes], None], str]]:
+    fitted = report.reference - report.fit.residuals
     drawings: list[tuple[str, Callable[[Axes], None], str]] = [
         ("residuals", lambda axes: _residuals(axes, report), "residuals against load"),
-        ("fitted", lambda axes: _against(axes, report, report.fitted, "fitted"), "residuals against fitted"),
+        ("fitted", lambda axes: _against(axes, report, fitted, "fitted"), "residuals against fitted"),
         ("order", lambda axes: _against(axes, report, _order(report), "order"), "residuals in order"),
         ("normal", lambda axes: _normal(axes, report), "normal quantiles of the residuals"),
         ("influence", lambda axes: _influence(axes, report), "leverage and Cook's distance"),
@@ -91,7 +92,7 @@ def _points(axes: Axes, report: FitReport, x: np.ndarray, y: np.ndarray) -> None
             x[rows], y[rows], linestyle="none", marker=marker, markersize=size, mfc="none",
             mec=colour, mew=0.9, label=label, rasterized=report.n > 2000, zorder=3,
         )  # fmt: skip
-    out = np.array(report.outliers, dtype=int) - 1
+    out = np.array(report.tests.outliers, dtype=int) - 1
     if len(out):
         axes.plot(x[out], y[out], linestyle="none", marker="o", markersize=11, mfc="none", mec=_LIMIT,
                   mew=1.2, label="outlier", zorder=4)  # fmt: skip
@@ -110,7 +111,7 @@ def _legend(axes: Axes) -> None:
 
 
 def _percent(report: FitReport) -> np.ndarray:
-    return 100 * report.residuals / report.full_scale
+    return 100 * report.fit.residuals / report.full_scale
 
 
 def _residuals(axes: Axes, report: FitReport) -> None:
@@ -141,8 +142,8 @@ def _against(axes: Axes, report: FitReport, x: np.ndarray, kind: str) -> None:
         axes.axhline(value, color=_GREY, linestyle=(0, (5, 3)), linewidth=0.9, zorder=2,
                      label="±2 standard deviations" if value > 0 else None)  # fmt: skip
     if kind == "order":
-        axes.plot(x, report.external, color="#c8c8c8", linewidth=0.7, zorder=2)
-    _points(axes, report, x, report.external)
+        axes.plot(x, report.tests.external, color="#c8c8c8", linewidth=0.7, zorder=2)
+    _points(axes, report, x, report.tests.external)
     label = "row of the data file" if kind == "order" else f"fitted {report.load} [{_unit(report)}]"
     _labels(axes, label, "externally studentised residual")
     _legend(axes)
@@ -153,34 +154,34 @@ def _normal(axes: Axes, report: FitReport) -> None:
 
     # Blom's plotting positions.
     quantile = np.empty(report.n)
-    order = np.argsort(report.internal, kind="stable")
+    order = np.argsort(report.tests.internal, kind="stable")
     quantile[order] = ndtri((np.arange(1, report.n + 1) - 0.375) / (report.n + 0.25))
     ends = np.array([quantile.min(), quantile.max()])
     axes.plot(ends, ends, color="#606060", linewidth=1.0, label="normal distribution", zorder=2)
-    _points(axes, report, quantile, report.internal)
+    _points(axes, report, quantile, report.tests.internal)
     _labels(axes, "normal quantile", "internally studentised residual")
     _legend(axes)
 
 
 def _influence(axes: Axes, report: FitReport) -> None:
-    p = report.n - report.dof
-    _points(axes, report, report.leverage, report.external)
-    right = 1.08 * float(report.leverage.max())
+    p = report.n - report.fit.dof
+    _points(axes, report, report.fit.leverage, report.tests.external)
+    right = 1.08 * float(report.fit.leverage.max())
     edge = np.linspace(max(0.02 * right, 1e-6), min(right, 0.999), 200)
     level = 4 / report.n
     # Cook's D = r^2 h / (1 - h) / p, in the internal residual r.
     curve = np.sqrt(level * p * (1 - edge) / edge)
-    top = 1.15 * max(3.0, float(np.abs(report.external).max()))
+    top = 1.15 * max(3.0, float(np.abs(report.tests.external).max()))
     for sign in (1, -1):
         axes.plot(edge, sign * curve, color=_LIMIT, linestyle=(0, (5, 3)), linewidth=1.0, zorder=2,
                   label=f"Cook's distance 4/n = {level:.2g}" if sign > 0 else None)  # fmt: skip
     axes.axvline(2 * p / report.n, color=_GREY, linestyle=(0, (1, 2)), linewidth=1.1, zorder=2,
                  label=f"twice the mean leverage, {2 * p / report.n:.2g}")  # fmt: skip
     axes.axhline(0.0, color="#606060", linewidth=0.8, zorder=1)
-    named = [i for i in np.argsort(-report.cook)[:_NAMED].tolist() if report.cook[i] > level]
+    named = [i for i in np.argsort(-report.tests.cook)[:_NAMED].tolist() if report.tests.cook[i] > level]
     for row in named:
-        if row + 1 not in report.outliers:
-            axes.annotate(str(row + 1), (report.leverage[row], report.external[row]),
+        if row + 1 not in report.tests.outliers:
+            axes.annotate(str(row + 1), (report.fit.leverage[row], report.tests.external[row]),
                           textcoords="offset points", xytext=(6, 4), fontsize=8, color="#303030")  # fmt: skip
     axes.set_xlim(0, right)
     axes.set_ylim(-top, top)

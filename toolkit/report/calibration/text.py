@@ -25,15 +25,15 @@ def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
         "n": report.n,
         "r_squared": report.r_squared,
         "predicted_r_squared": report.predicted_r_squared,
-        "press": report.press,
+        "press": report.tests.press,
         "coefficients": {c.term: _entry_without(c, "term") for c in report.coefficients},
-        "covariance": report.covariance.tolist(),
+        "covariance": report.fit.covariance.tolist(),
         "correlation": report.correlation.tolist(),
         "vif": dict(report.vif),
         "lack_of_fit": None if lack is None else asdict(lack),
         "levels": report.levels,
         "replicated_rows": report.replicated_rows,
-        "heteroscedasticity_p": report.heteroscedasticity,
+        "heteroscedasticity_p": report.tests.heteroscedasticity,
         "normality": None if report.normality is None else {
             "W": report.normality[0], "probability": report.normality[1],
         },
@@ -49,12 +49,12 @@ def report_dict(report: FitReport, *, rows: bool) -> dict[str, Any]:
         weight = report.robust_weight
         content["rows"] = {
             "reference": report.reference.tolist(),
-            "fitted": report.fitted.tolist(),
-            "residual": report.residuals.tolist(),
-            "leverage": report.leverage.tolist(),
-            "internal": report.internal.tolist(),
-            "external": report.external.tolist(),
-            "cook": report.cook.tolist(),
+            "fitted": (report.reference - report.fit.residuals).tolist(),
+            "residual": report.fit.residuals.tolist(),
+            "leverage": report.fit.leverage.tolist(),
+            "internal": report.tests.internal.tolist(),
+            "external": report.tests.external.tolist(),
+            "cook": report.tests.cook.tolist(),
             "robust_weight": None if weight is None else weight.tolist(),
             "direction": None if report.direction is None else list(report.direction),
         }
@@ -94,7 +94,7 @@ def report_text(report: FitReport) -> str:
     """Return a load's whole report as lines."""
     unit, fs = report.unit, "% FS"
     lines = [
-        f"{report.load} [{unit}]  {report.n} rows, {report.dof} degrees of freedom, full scale "
+        f"{report.load} [{unit}]  {report.n} rows, {report.fit.dof} degrees of freedom, full scale "
         f"{report.full_scale:.6g} {unit}",
         "",
         table(
@@ -179,15 +179,17 @@ def balance_text(report: BalanceReport) -> str:
 
 
 def _figures(report: FitReport) -> list[tuple[str, str]]:
+    fit, tests = report.fit, report.tests
+    of_cells, of_terms = report.adequacy.condition_number, report.adequacy.condition_number_terms
     unit, fs = report.unit, 100 / report.full_scale
-    lack, spread, normal = report.lack_of_fit, report.heteroscedasticity, report.normality
+    lack, spread, normal = report.lack_of_fit, tests.heteroscedasticity, report.normality
     levels = f"{report.levels} load levels with {report.replicated_rows} rows"
     rows = [
-        ("residual sd", f"{report.residual_sd:.4g} {unit} ({report.residual_sd * fs:.3g} % FS)"),
-        ("PRESS (rms, left out)", f"{report.press:.4g} {unit} ({report.press * fs:.3g} % FS)"),
+        ("residual sd", f"{fit.residual_sd:.4g} {unit} ({fit.residual_sd * fs:.3g} % FS)"),
+        ("PRESS (rms, left out)", f"{tests.press:.4g} {unit} ({tests.press * fs:.3g} % FS)"),
         ("R^2, predicted R^2", f"{_near_one(report.r_squared)}, {_near_one(report.predicted_r_squared)}"),
         ("prediction, full scale", f"± {report.prediction_half_width:.4g} {unit} (95 %)"),
-        ("condition number", f"{report.condition_number:.3g} (terms {report.condition_number_terms:.3g})"),
+        ("condition number", f"{of_cells:.3g} (terms {of_terms:.3g})"),
         ("VIF", ", ".join(f"{name} {value:.2f}" for name, value in report.vif)),
         ("lack of fit", f"none determined; {levels}" if lack is None else (
             f"F({lack.lack_dof}, {lack.pure_dof}) = {lack.F:.3g}, p = {lack.probability:.2g}; {levels}, "
@@ -202,24 +204,25 @@ def _figures(report: FitReport) -> list[tuple[str, str]]:
 
 
 def _rows(report: FitReport) -> str:
-    mean = 1 - report.dof / report.n
+    fit, tests = report.fit, report.tests
+    mean = 1 - fit.dof / report.n
     weight = np.ones(report.n) if report.robust_weight is None else report.robust_weight
     marks = {
-        "outlier": np.isin(np.arange(report.n), np.array(report.outliers, dtype=int) - 1),
-        "leverage": report.leverage > 2 * mean,
-        "Cook": report.cook > 4 / report.n,
+        "outlier": np.isin(np.arange(report.n), np.array(tests.outliers, dtype=int) - 1),
+        "leverage": fit.leverage > 2 * mean,
+        "Cook": tests.cook > 4 / report.n,
         "robust": weight < 0.05,
     }
     interest = np.flatnonzero(np.any(list(marks.values()), axis=0))
     if not len(interest):
         return "  none: no outlier, no leverage over twice the mean, no Cook's distance over 4/n"
-    order = interest[np.argsort(-report.cook[interest])][:_MOST_ROWS]
+    order = interest[np.argsort(-tests.cook[interest])][:_MOST_ROWS]
     text = table(
         ["row", "reference", "residual", "leverage", "internal", "external", "Cook", "weight", "why"],
         [
-            [str(i + 1), f"{report.reference[i]:.6g}", f"{report.residuals[i]:+.3g}",
-             f"{report.leverage[i]:.3f}", f"{report.internal[i]:+.2f}", f"{report.external[i]:+.2f}",
-             f"{report.cook[i]:.3f}", f"{weight[i]:.2f}",
+            [str(i + 1), f"{report.reference[i]:.6g}", f"{fit.residuals[i]:+.3g}",
+             f"{fit.leverage[i]:.3f}", f"{tests.internal[i]:+.2f}", f"{tests.external[i]:+.2f}",
+             f"{tests.cook[i]:.3f}", f"{weight[i]:.2f}",
              ", ".join(name for name, rows in marks.items() if rows[i])]
             for i in order.tolist()
         ],

@@ -95,53 +95,23 @@ def collect(
     return Certificate(
         id=_identity(record, stated, replaces, amendment),
         issued=day,
-        received=stated.received,
-        calibrated=statements.date,
-        approved_on=None if reasons else status.known_on,
-        in_force_from=None if reasons else status.in_force_from,
+        record=record,
+        statements=statements,
+        stated=stated,
+        approval=None if reasons else status,
+        status=later,
         draft_reasons=reasons,
         simulated=_simulated(record.instrument),
-        withdrawn=_withdrawn(later),
         replaces=replaces,
         amendment=amendment,
-        laboratory=stated.get("laboratory"),
-        address=stated.get("address"),
-        place=stated.get("place"),
-        country=stated.get("country"),
-        accreditation=stated.get("accreditation"),
-        customer=stated.get("customer"),
-        customer_address=stated.get("customer_address"),
         item=stated.get("item") or f"Load cells {', '.join(record.indications)} of {record.instrument}",
-        instrument=record.instrument,
-        method=stated.get("method"),
         model=_model(record),
-        phase=statements.phase,
         adjustment=_adjustment(statements, as_found_result),
-        temperature_C=statements.temperature_C,
-        reference=statements.reference.standard,
-        reference_certificate=statements.reference.certificate,
-        reference_uncertainties=tuple(
-            (uncertainty.load, uncertainty.U, uncertainty.k, record.load(uncertainty.load).unit)
-            if uncertainty.relative is None
-            else (uncertainty.load, 100 * uncertainty.relative, uncertainty.k, "% of the applied load")
-            for uncertainty in statements.reference.uncertainties
-        ),
-        reference_digital=statements.reference.digital,
-        rule=stated.rule,
-        interval=stated.interval,
-        opinions=stated.get("opinions"),
         entered_by=titled(record.entered_by),
         checked_by=None if reasons or status.checked_by is None else titled(status.checked_by),
         approved_by=None if reasons or status.approved_by is None else titled(status.approved_by),
-        status=later.state,
-        record=record.id,
-        record_sha256=record.sha256,
-        record_software=record.software,
-        data=record.data,
         ledger_head=ledger.decided,
         signature=registry.signature(record.id),
-        cells=record.cells,
-        resolutions=tuple(statements.cell(cell.name).stated_resolution for cell in record.cells),
         loads=results,
         gaps=gaps,
         findings=(
@@ -267,18 +237,6 @@ def _same_number(registry: Registry, record: CalibrationRecord, stated: Stated) 
     return None
 
 
-def _withdrawn(status: RecordStatus) -> str | None:
-    if status.state != "withdrawn":
-        return None
-    void = (
-        f", void from {status.void_from.isoformat()}"
-        if status.void_from and not status.void_always
-        else ", void on every day"
-    )
-    day = status.known_on.isoformat() if status.known_on else "an unknown day"
-    return f"{status.id} was withdrawn on {day}{void}: {status.reason or 'no reason stated'}"
-
-
 def _model(record: CalibrationRecord) -> str:
     terms = record.loads[0].terms
     fit = _METHODS.get(record.loads[0].method, record.loads[0].method)
@@ -367,12 +325,12 @@ def result_findings(
             for line in result.checks
             if line.beyond
         ]
-        if result.not_stated:
+        if absent := result.full_scale.not_stated:
             findings.append(
                 Finding(
                     rule="certificate-budget",
                     where=result.load,
-                    message=f"the uncertainty holds no contribution of {', '.join(result.not_stated)}: "
+                    message=f"the uncertainty holds no contribution of {', '.join(absent)}: "
                     "nothing was stated or measured",
                     level="note",
                 )

@@ -7,6 +7,7 @@ Required of every template are the items without which a paper is no calibration
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 from toolkit.estimate import round_uncertainty
 from toolkit.report.certificate.model import VERDICTS, Certificate
@@ -16,6 +17,9 @@ from toolkit.report.document import Document
 from toolkit.report.style import Style
 from toolkit.units import printed
 from toolkit.version import __version__
+
+if TYPE_CHECKING:
+    from toolkit.calibration.session.statements import DigitalSource
 
 GAP = "NOT STATED"
 _PERCENT = re.compile(r"\d+\.\d+(?= %)")
@@ -48,16 +52,16 @@ def build_content(certificate: Certificate, style: Style | None = None) -> Repor
         style or Style(),
         calibrations=(certificate.use,),
         title=f"Calibration certificate {certificate.id}",
-        author=certificate.laboratory or "laboratory not stated",
+        author=certificate.stated.get("laboratory") or "laboratory not stated",
         identity=certificate.id,
-        subject=f"Calibration of {certificate.instrument}",
+        subject=f"Calibration of {certificate.record.instrument}",
         issued=certificate.issued,
     )
 
 
 def draft_text(c: Certificate) -> str:
     """Return what a paper that is no certificate says of itself, and why."""
-    return f"{DRAFT} {c.record}: {'; '.join(c.draft_reasons)}."
+    return f"{DRAFT} {c.record.id}: {'; '.join(c.draft_reasons)}."
 
 
 def traceability(c: Certificate, style: Style | None = None) -> str:
@@ -65,26 +69,27 @@ def traceability(c: Certificate, style: Style | None = None) -> str:
 
     Without a style its numbers have a decimal point, as in the DCC.
     """
-    if c.reference is None:
+    reference = c.statements.reference
+    if reference.standard is None:
         return f"{GAP}: the session names no reference standard."
     text = (
-        f"The results are traceable through the reference standard {c.reference}, certificate "
-        f"{c.reference_certificate or GAP}."
+        f"The results are traceable through the reference standard {reference.standard}, certificate "
+        f"{reference.certificate or GAP}."
     )
-    for load, U, k, unit in c.reference_uncertainties:
+    for stated in reference.uncertainties:
+        U, unit = stated.U, c.record.load(stated.load).unit
+        if stated.relative is not None:
+            U, unit = 100 * stated.relative, "% of the applied load"
         # As the standard's own certificate states it, where that takes fewer digits.
-        stated = min(round_uncertainty(U), f"{U:g}", key=len)
+        shortest = min(round_uncertainty(U), f"{U:g}", key=len)
         text += (
-            f" Its uncertainty for {load}: U = {signed(stated, style)} {printed(unit)}, "
-            f"k = {signed(f'{k:g}', style)}."
+            f" Its uncertainty for {stated.load}: U = {signed(shortest, style)} {printed(unit)}, "
+            f"k = {signed(f'{stated.k:g}', style)}."
         )
-    return text + _digital(c)
+    return text if reference.digital is None else text + _digital(reference.digital)
 
 
-def _digital(c: Certificate) -> str:
-    source = c.reference_digital
-    if source is None:
-        return ""
+def _digital(source: DigitalSource) -> str:
     accredited = f", {source.accreditation}" if source.accreditation else ""
     places = "; ".join(f"{load}: {source.place(load)}" for load, *_ in source.places)
     return (
@@ -96,7 +101,7 @@ def _digital(c: Certificate) -> str:
 
 def uncertainty(c: Certificate) -> str:
     """Return the statement about U, with what it does not hold."""
-    absent = sorted({name for load in c.loads for name in load.not_stated})
+    absent = sorted({name for load in c.loads for name in load.full_scale.not_stated})
     if not absent:
         return UNCERTAINTY
     return f"{UNCERTAINTY} It holds no contribution of {', '.join(absent)}: nothing was stated or measured."
@@ -104,7 +109,7 @@ def uncertainty(c: Certificate) -> str:
 
 def conformity(c: Certificate, style: Style | None = None) -> str:
     """Return the statement of conformity, or why there is none (ISO/IEC 17025:2017, 7.8.6)."""
-    if c.rule is None:
+    if c.stated.rule is None:
         return "No conformity is stated: no decision rule was agreed."
     if not any(load.checks for load in c.loads):
         return "No conformity is stated: the session has no check loads."
@@ -133,21 +138,22 @@ def signed(number: str, style: Style | None) -> str:
 
 
 def _temperature(c: Certificate, style: Style) -> str:
-    return GAP if c.temperature_C is None else f"{signed(f'{c.temperature_C:.4g}', style)} °C"
+    at = c.statements.temperature_C
+    return GAP if at is None else f"{signed(f'{at:.4g}', style)} °C"
 
 
 def _decision_rule(c: Certificate, style: Style) -> str:
-    if not c.rule:
+    if not c.stated.rule:
         return f"{GAP}: no decision rule was agreed."
-    return _PERCENT.sub(lambda number: signed(number[0], style), RULES[c.rule])
+    return _PERCENT.sub(lambda number: signed(number[0], style), RULES[c.stated.rule])
 
 
 def _phase(c: Certificate, _style: Style) -> str:
-    return {"as_found": "as found", "as_left": "as left"}.get(c.phase or "", "as calibrated")
+    return {"as_found": "as found", "as_left": "as left"}.get(c.statements.phase or "", "as calibrated")
 
 
 def _customer(c: Certificate, _style: Style) -> str:
-    return ", ".join(part for part in (c.customer, c.customer_address) if part) or GAP
+    return ", ".join(filter(None, map(c.stated.get, ("customer", "customer_address")))) or GAP
 
 
 def _checked_by(c: Certificate, _style: Style) -> str:
@@ -160,15 +166,16 @@ def _approved_by(c: Certificate, _style: Style) -> str:
 
 
 def _in_force_from(c: Certificate, _style: Style) -> str | None:
-    return None if c.in_force_from is None else c.in_force_from.isoformat()
+    day = c.approval and c.approval.in_force_from
+    return day.isoformat() if day else None
 
 
 def _status(c: Certificate, _style: Style) -> str:
-    return f"not approved: {'; '.join(c.draft_reasons)}" if c.draft else c.status
+    return f"not approved: {'; '.join(c.draft_reasons)}" if c.draft else c.status.state
 
 
 def _record_software(c: Certificate, _style: Style) -> str:
-    return ", ".join(f"{name} {version}" for name, version in c.record_software) or GAP
+    return ", ".join(f"{name} {version}" for name, version in c.record.software) or GAP
 
 
 def _amended_mark(c: Certificate, _style: Style) -> str | None:
@@ -179,22 +186,22 @@ _text, _date, _when, _mark = CERTIFICATE.text, CERTIFICATE.date, CERTIFICATE.con
 VALUES = (
     _text("id", "unique identification of the certificate", lambda c, _: c.id),
     _text("title", "title", lambda c, _: "Calibration certificate" + (", amended" if c.replaces else "")),
-    _text("laboratory", "name of the laboratory", lambda c, _: c.laboratory or GAP),
-    _text("address", "its address", lambda c, _: c.address or GAP),
-    _text("place", "where the calibration was done", lambda c, _: c.place or GAP),
-    _text("accreditation", "accreditation, where one was stated", lambda c, _: c.accreditation),
+    _text("laboratory", "name of the laboratory", lambda c, _: c.stated.get("laboratory") or GAP),
+    _text("address", "its address", lambda c, _: c.stated.get("address") or GAP),
+    _text("place", "where the calibration was done", lambda c, _: c.stated.get("place") or GAP),
+    _text("accreditation", "accreditation, where one was stated", lambda c, _: c.stated.get("accreditation")),
     _text("customer", "name and address of the customer", _customer),
     _text("item", "what was calibrated", lambda c, _: c.item),
-    _text("instrument", "instrument", lambda c, _: c.instrument),
+    _text("instrument", "instrument", lambda c, _: c.record.instrument),
     _text("model", "form of the calibration equation and method of its fit", lambda c, _: c.model),
-    _text("method", "method of the calibration", lambda c, _: c.method or GAP),
+    _text("method", "method of the calibration", lambda c, _: c.stated.get("method") or GAP),
     _text("phase", "state of the item: as found, as left, or not stated", _phase),
     _text("temperature", "temperature during the calibration", _temperature),
-    _text("reference", "reference standard", lambda c, _: c.reference or GAP),
+    _text("reference", "reference standard", lambda c, _: c.statements.reference.standard or GAP),
     _text(
         "reference_certificate",
         "certificate of the reference standard",
-        lambda c, _: c.reference_certificate or GAP,
+        lambda c, _: c.statements.reference.certificate or GAP,
     ),
     _text("traceability", "statement of metrological traceability", traceability),
     _text("uncertainty", "statement about the expanded uncertainty", lambda c, _: uncertainty(c)),
@@ -210,8 +217,12 @@ VALUES = (
         "statement about the terms that the check loads could not verify",
         lambda c, _: unverifiable(c),
     ),
-    _text("opinions", "opinions and interpretations, marked as such", lambda c, _: c.opinions),
-    _text("interval", "calibration interval or due date; only where it was agreed", lambda c, _: c.interval),
+    _text("opinions", "opinions and interpretations, marked as such", lambda c, _: c.stated.get("opinions")),
+    _text(
+        "interval",
+        "calibration interval or due date; only where it was agreed",
+        lambda c, _: c.stated.interval,
+    ),
     _text("replaces", "the certificate that this one replaces", lambda c, _: c.replaces),
     _text("amendment", "why it was amended", lambda c, _: c.amendment),
     _text("entered_by", "who calibrated and entered the record", lambda c, _: c.entered_by),
@@ -220,8 +231,8 @@ VALUES = (
     _text("in_force_from", "first day on which the record is in force", _in_force_from),
     _text("status", "status of the calibration record", _status),
     _text("withdrawn", "why and from when the record is void", lambda c, _: c.withdrawn),
-    _text("record", "id of the calibration record", lambda c, _: c.record),
-    _text("record_hash", "SHA-256 of the calibration record", lambda c, _: c.record_sha256),
+    _text("record", "id of the calibration record", lambda c, _: c.record.id),
+    _text("record_hash", "SHA-256 of the calibration record", lambda c, _: c.record.sha256),
     _text(
         "ledger_head",
         "hash of the ledger's last line that decides about a record, at the issue",
@@ -231,9 +242,9 @@ VALUES = (
     _text("record_software", "programs and versions that made the record", _record_software),
     _text("not_stated", "what the session did not state", lambda c, _: "; ".join(c.gaps) or None),
     _date("issued", "date of issue", lambda c, _: c.issued),
-    _date("received", "date of receipt of the item, where it was stated", lambda c, _: c.received),
-    _date("calibrated", "date of the calibration", lambda c, _: c.calibrated),
-    _date("approved_on", "day of the approval", lambda c, _: c.approved_on),
+    _date("received", "date of receipt of the item, where it was stated", lambda c, _: c.stated.received),
+    _date("calibrated", "date of the calibration", lambda c, _: c.statements.date),
+    _date("approved_on", "day of the approval", lambda c, _: c.approval.known_on if c.approval else None),
 )
 
 MARKS = (
@@ -244,7 +255,7 @@ MARKS = (
     _when(
         "interval_agreed",
         "an interval was agreed with the customer and stated",
-        lambda c, _: c.interval is not None,
+        lambda c, _: c.stated.interval is not None,
     ),
     _when("gaps", "something that a certificate should say was not stated", lambda c, _: bool(c.gaps)),
     _when("conformity_stated", "conformity is stated", lambda c, _: any(load.verdict for load in c.loads)),

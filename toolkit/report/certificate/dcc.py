@@ -55,36 +55,37 @@ def build_dcc(certificate: Certificate) -> bytes:
 
 
 def _administrative(c: Certificate) -> Node:
-    if c.country is None:
+    stated, record = c.stated.get, c.record
+    if (country := stated("country")) is None:
         raise ConfigError(
             "the digital certificate needs the laboratory's country",
-            where=f"{c.record}: [certificate] country",
+            where=f"{record.id}: [certificate] country",
             got="nothing",
             expected='an ISO 3166-1 code, such as country = "US"',
             next_step="state it under [laboratory] of the style file beside the template, or leave out --dcc",
             rule="certificate-country",
         )
-    day = c.calibrated.isoformat()
+    day = c.statements.date.isoformat()
     return node(
         "dcc:administrativeData",
         node("dcc:dccSoftware", _software("toolkit", __version__)),
         node(
             "dcc:coreData",
-            node("dcc:countryCodeISO3166_1", c.country),
+            node("dcc:countryCodeISO3166_1", country),
             node("dcc:usedLangCodeISO639_1", "en"),
             node("dcc:mandatoryLangCodeISO639_1", "en"),
             node("dcc:uniqueIdentifier", ("DRAFT " if c.draft else "") + c.id),
             node(
                 "dcc:identifications",
-                _identification("calibrationLaboratory", c.record, "Calibration record"),
-                _identification("calibrationLaboratory", c.record_sha256, "SHA-256 of the record"),
+                _identification("calibrationLaboratory", record.id, "Calibration record"),
+                _identification("calibrationLaboratory", record.sha256, "SHA-256 of the record"),
                 _identification("calibrationLaboratory", c.ledger_head, "Head of the ledger"),
                 _identification("calibrationLaboratory", c.signature, "Signatures of the record"),
             ),
-            c.received and node("dcc:receiptDate", c.received.isoformat()),
+            c.stated.received and node("dcc:receiptDate", c.stated.received.isoformat()),
             node("dcc:beginPerformanceDate", day),
             node("dcc:endPerformanceDate", day),
-            node("dcc:performanceLocation", "other" if c.place else "laboratory"),
+            node("dcc:performanceLocation", "other" if stated("place") else "laboratory"),
             node("dcc:issueDate", c.issued.isoformat()),
             c.replaces
             and node(
@@ -100,18 +101,18 @@ def _administrative(c: Certificate) -> Node:
                 text("dcc:name", c.item),
                 node(
                     "dcc:identifications",
-                    _identification("calibrationLaboratory", c.instrument, "Instrument"),
+                    _identification("calibrationLaboratory", record.instrument, "Instrument"),
                     *(
                         _identification("manufacturer", cell.serial, f"Serial number of {cell.name}")
-                        for cell in c.cells
+                        for cell in record.cells
                         if cell.serial
                     ),
                 ),
             ),
         ),
-        node("dcc:calibrationLaboratory", _contact("dcc:contact", c.laboratory, c.address)),
+        node("dcc:calibrationLaboratory", _contact("dcc:contact", stated("laboratory"), stated("address"))),
         node("dcc:respPersons", *_persons(c)),
-        _contact("dcc:customer", c.customer, c.customer_address),
+        _contact("dcc:customer", stated("customer"), stated("customer_address")),
         node("dcc:statements", *_statements(c)),
     )
 
@@ -136,16 +137,16 @@ def _statements(c: Certificate) -> list[Node]:
         ("Simulation", words.SIMULATED if c.simulated else None),
         ("Withdrawal", c.withdrawn),
         ("Items", "The results relate only to the items calibrated."),
-        ("Place", c.place),
-        ("Accreditation", c.accreditation),
+        ("Place", c.stated.get("place")),
+        ("Accreditation", c.stated.get("accreditation")),
         ("Amendment", f"Replaces {c.replaces}. Reason: {c.amendment}" if c.replaces else None),
         ("Metrological traceability", words.traceability(c)),
-        ("Decision rule", RULES[c.rule] if c.rule else None),
+        ("Decision rule", RULES[c.stated.rule] if c.stated.rule else None),
         ("Conformity", words.conformity(c)),
         ("Unverified terms", _unverified(c)),
         ("Adjustment", c.adjustment),
-        ("Opinion, not a result", c.opinions),
-        ("Agreed with the customer", c.interval),
+        ("Opinion, not a result", c.stated.get("opinions")),
+        ("Agreed with the customer", c.stated.interval),
         ("Not stated", "; ".join(c.gaps) or None),
     ]
     nodes = [
@@ -155,7 +156,7 @@ def _statements(c: Certificate) -> list[Node]:
     ]
     outside = dict.fromkeys(
         unit_text
-        for unit_text in [*(o.unit for o in c.loads), *(o.unit for o in c.cells)]
+        for unit_text in [*(o.unit for o in c.loads), *c.record.indication_units]
         if _not_si(unit_text)
     )
     nodes += [
@@ -180,16 +181,17 @@ def _not_si(name: str) -> bool:
 
 
 def _results(c: Certificate) -> Node:
+    reference = c.statements.reference
     return node(
         "dcc:measurementResults",
         node(
             "dcc:measurementResult",
-            text("dcc:name", f"Calibration of {c.instrument}"),
+            text("dcc:name", f"Calibration of {c.record.instrument}"),
             node(
                 "dcc:usedMethods",
                 node(
                     "dcc:usedMethod",
-                    text("dcc:name", c.method or words.GAP),
+                    text("dcc:name", c.stated.get("method") or words.GAP),
                     rich("dcc:description", c.model),
                 ),
                 node(
@@ -201,13 +203,13 @@ def _results(c: Certificate) -> Node:
                 ),
             ),
             node("dcc:usedSoftware", _software("toolkit", __version__)),
-            c.reference
+            reference.standard
             and node(
                 "dcc:measuringEquipments",
                 node(
                     "dcc:measuringEquipment",
-                    text("dcc:name", c.reference),
-                    rich("dcc:description", f"certificate {c.reference_certificate or words.GAP}"),
+                    text("dcc:name", reference.standard),
+                    rich("dcc:description", f"certificate {reference.certificate or words.GAP}"),
                     refType="basic_measurementStandard",
                 ),
             ),
@@ -218,11 +220,11 @@ def _results(c: Certificate) -> Node:
 
 
 def _conditions(c: Certificate) -> Node | None:
-    if c.temperature_C is None:
+    if c.statements.temperature_C is None:
         return None
-    kelvin = f"{c.temperature_C + 273.15:.2f}"
+    kelvin = f"{c.statements.temperature_C + 273.15:.2f}"
     data = node("dcc:data", quantity("Temperature", kelvin, r"\kelvin"))
-    status = {"as_found": "beforeAdjustment", "as_left": "afterAdjustment"}.get(c.phase or "")
+    status = {"as_found": "beforeAdjustment", "as_left": "afterAdjustment"}.get(c.statements.phase or "")
     return node(
         "dcc:influenceConditions",
         node(
@@ -245,7 +247,7 @@ def _load(c: Certificate, load: LoadResult) -> list[Node]:
 
 
 def _equation(c: Certificate, load: LoadResult) -> Node:
-    units = {cell.name: cell.unit for cell in c.cells}
+    units = c.record.units
     lines = []
     for term in load.terms:
         coefficient_unit = dsi_of_term(load.unit, term.term, units)

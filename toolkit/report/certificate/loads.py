@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.calibration.terms import INTERCEPT, parse_term, term_matrix
+from toolkit.calibration.terms import INTERCEPT, parse_term
 from toolkit.calibration.uncertainty.budget import calibration_budget, predict
 from toolkit.calibration.uncertainty.common_errors import standard_errors
-from toolkit.report.certificate.model import Adjustment, CheckLine, Expanded, LoadResult, Part, TermLine
+from toolkit.report.certificate.model import Adjustment, CheckLine, LoadResult, TermLine
 from toolkit.report.certificate.statements import decide
 
 if TYPE_CHECKING:
@@ -67,45 +67,24 @@ def _load(
     as_left: bool,
 ) -> LoadResult:
     reference = loads.column(load.load)
-    fitted = term_matrix(load.terms, loads.columns(record.indications)) @ np.asarray(load.coefficients)
+    fitted = load.at(loads.columns(record.indications))
     residuals = fitted - reference
-    tolerance = load.tolerance or 1e-3 * load.largest
+    tolerance = load.check_tolerance
     checks = () if check is None else _checks(record, load, loads, check, rule, tolerance)
-    full = calibration_budget(record, loads, check, load.load)
     errors = standard_errors(record, load.load)
     return LoadResult(
-        load=load.load,
-        unit=load.unit,
+        fit=load,
         terms=tuple(
             TermLine(term=t, full=c, issued=i, standard_error=u, unit=_term_unit(record, load, t))
             for t, c, i, u in zip(load.terms, load.coefficients, load.issued_texts, errors, strict=True)
         ),
-        method=load.method,
-        n=loads.rows,
-        dof=load.dof or 0,
-        residual_sd=load.residual_sd or 0.0,
-        minimum=float(reference.min()),
-        maximum=float(reference.max()),
         tolerance=tolerance,
         references=tuple(reference.tolist()),
         residuals=tuple(residuals.tolist()),
-        full_scale=_expanded(full),
+        full_scale=calibration_budget(record, loads, check, load.load),
         range=tuple(
-            _expanded(calibration_budget(record, loads, check, load.load, at))
+            calibration_budget(record, loads, check, load.load, at)
             for at in steps(float(reference.min()), float(reference.max()))
-        ),
-        parts=tuple(
-            Part(
-                name=part.name,
-                evaluation=part.type,
-                distribution=part.distribution,
-                u=part.u,
-                dof=part.dof,
-                share=full.share(part),
-                source=part.source,
-                stated=part.stated,
-            )
-            for part in full.components
         ),
         checks=checks,
         adjustment=_adjustment(
@@ -139,25 +118,21 @@ def _checks(
         prediction = predict(
             record, loads, check, load.load, dict(zip(record.indications, point, strict=True))
         )
-        uncertainty = _expanded(prediction.budget)
+        result, uncertainty = prediction.budget.at, prediction.budget
         stated = rule is not None and not prediction.beyond
         lines.append(
             CheckLine(
                 row=row,
                 reference=reference,
-                result=prediction.budget.at,
+                result=result,
                 uncertainty=uncertainty,
                 beyond=prediction.beyond,
-                verdict=decide(rule, prediction.budget.at - reference, tolerance, uncertainty.U)
+                verdict=decide(rule, result - reference, tolerance, uncertainty.U)
                 if stated and rule
                 else None,
             )
         )
     return tuple(lines)
-
-
-def _expanded(budget: Budget) -> Expanded:
-    return Expanded(at=budget.at, U=budget.U, k=budget.k, probability=budget.probability, dof=budget.dof)
 
 
 def _left(
@@ -167,18 +142,18 @@ def _left(
     check: Table | None,
     residuals: Array,
     checks: tuple[CheckLine, ...],
-) -> tuple[float, Expanded]:
+) -> tuple[float, Budget]:
     """Return the largest deviation as left and its uncertainty: of the check loads, else of the residuals."""
     if checks:
         worst = max(checks, key=lambda line: abs(line.deviation))
         return worst.deviation, worst.uncertainty
     row = int(np.abs(residuals).argmax())
     at = float(loads.column(load.load)[row])
-    return float(residuals[row]), _expanded(calibration_budget(record, loads, check, load.load, at))
+    return float(residuals[row]), calibration_budget(record, loads, check, load.load, at)
 
 
 def _adjustment(
-    load: LoadFit, session: FoundSession | None, as_left: tuple[float, Expanded] | None
+    load: LoadFit, session: FoundSession | None, as_left: tuple[float, Budget] | None
 ) -> Adjustment | None:
     deviation = next((o for o in session.result.loads if o.load == load.load), None) if session else None
     if deviation is None or session is None or session.result.record is None:
@@ -189,7 +164,7 @@ def _adjustment(
     return Adjustment(
         found_by=session.result.record,
         as_found=deviation.max_error,
-        found=_expanded(calibration_budget(session.session, session.loads, session.check, load.load, at)),
+        found=calibration_budget(session.session, session.loads, session.check, load.load, at),
         as_left=None if as_left is None else as_left[0],
         left=None if as_left is None else as_left[1],
     )
@@ -198,7 +173,7 @@ def _adjustment(
 def _term_unit(record: CalibrationRecord, load: LoadFit, term: str) -> str:
     if term == INTERCEPT:
         return load.unit
-    units = dict(zip(record.indications, record.indication_units, strict=True))
+    units = record.units
     parsed = parse_term(term)
     factors = [f"({units[name]})" + (f"^{power}" if power > 1 else "") for name, power in parsed.powers]
     factors += [f"({units[name]})" for name in parsed.absolutes]

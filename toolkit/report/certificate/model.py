@@ -1,20 +1,25 @@
 """What a calibration certificate says, before it is a document: numbers in the record's units, and texts.
 
 The items are those of ISO/IEC 17025:2017, 7.8.2.1 (every report), 7.8.4.1 (calibration certificates),
-7.8.6.2 (conformity), 7.8.7 (opinions) and 7.8.8 (amendments). What nobody stated is None here and a
-visible gap on paper.
+7.8.6.2 (conformity), 7.8.7 (opinions) and 7.8.8 (amendments). It holds what it is of, the record and what its
+session stated, and repeats nothing of them. What nobody stated is None there and a visible gap on paper.
 """
 
 from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from toolkit.calibration.records.record import DataFile, Indication
 from toolkit.calibration.records.use import CalibrationUse
-from toolkit.calibration.session.statements import DigitalSource
-from toolkit.findings import Finding
+
+if TYPE_CHECKING:
+    from toolkit.calibration.records.record import CalibrationRecord, LoadFit
+    from toolkit.calibration.registry.status import RecordStatus
+    from toolkit.calibration.session.statements import Statements
+    from toolkit.calibration.uncertainty.model import Budget
+    from toolkit.findings import Finding
+    from toolkit.report.certificate.statements import Stated
 
 # Loads of a certificate that have a picture.
 MOST_FIGURES = 6
@@ -26,31 +31,6 @@ VERDICTS: dict[str, str] = {
     "conditionalFail": "conditional fail",
     "fail": "fail",
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Expanded:
-    """An expanded uncertainty at a load: ``at`` and ``U`` in the load's unit, ``probability`` 0 to 1."""
-
-    at: float
-    U: float
-    k: float
-    probability: float
-    dof: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
-    """One component of the budget at full scale: ``u`` in the load's unit, ``share`` of the variance."""
-
-    name: str
-    evaluation: str
-    distribution: str
-    u: float
-    dof: float
-    share: float
-    source: str
-    stated: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +54,7 @@ class CheckLine:
     row: int
     reference: float
     result: float
-    uncertainty: Expanded
+    uncertainty: Budget
     beyond: tuple[str, ...]
     verdict: Verdict | None
 
@@ -95,37 +75,44 @@ class Adjustment:
 
     found_by: str
     as_found: float
-    found: Expanded
+    found: Budget
     as_left: float | None
-    left: Expanded | None
+    left: Budget | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadResult:
-    """The results of one load, in ``unit``.
+    """The results of one load, in the unit of its ``fit``, the record's equation.
 
     ``references`` and ``residuals`` (fitted - reference) are those of the fitted rows; ``range`` has the
-    expanded uncertainty over the calibrated range, ``full_scale`` that at the end with the larger load.
+    budgets over the calibrated range, ``full_scale`` that at the end with the larger load.
     """
 
-    load: str
-    unit: str
+    fit: LoadFit
     terms: tuple[TermLine, ...]
-    method: str
-    n: int
-    dof: int
-    residual_sd: float
-    minimum: float
-    maximum: float
     tolerance: float
     references: tuple[float, ...]
     residuals: tuple[float, ...]
-    full_scale: Expanded
-    range: tuple[Expanded, ...]
-    parts: tuple[Part, ...]
+    full_scale: Budget
+    range: tuple[Budget, ...]
     checks: tuple[CheckLine, ...]
     adjustment: Adjustment | None
     unverifiable: tuple[str, ...]
+
+    @property
+    def load(self) -> str:
+        """Name of the load."""
+        return self.fit.load
+
+    @property
+    def unit(self) -> str:
+        """Unit of the load, and of every value here."""
+        return self.fit.unit
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest reference load."""
+        return min(self.references), max(self.references)
 
     @property
     def verdict(self) -> Verdict | None:
@@ -136,66 +123,36 @@ class LoadResult:
             return None
         return max((verdict for verdict in stated if verdict), key=order.index)
 
-    @property
-    def not_stated(self) -> tuple[str, ...]:
-        """Components of the budget for which nothing was stated or measured."""
-        return tuple(part.name for part in self.parts if not part.stated)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
     """A calibration certificate's content.
 
-    ``simulated``: the instrument is a virtual machine. ``draft_reasons``: why the record is not
-    approved, and the paper no certificate. ``rule`` is ``simple``, ``guard_band`` or None where no decision
-    rule was agreed: then no conformity is stated.
+    ``approval`` is the record's status on the day of issue, None where it is not approved:
+    ``draft_reasons`` say why, and the paper is no certificate. ``status`` is what is known today.
+    ``simulated``: the instrument is a virtual machine.
     ``gaps`` names what a certificate should say and nobody stated; ``findings`` has them too.
     """
 
     id: str
     issued: dt.date
-    received: dt.date | None
-    calibrated: dt.date
-    approved_on: dt.date | None
-    in_force_from: dt.date | None
+    record: CalibrationRecord
+    statements: Statements
+    stated: Stated
+    approval: RecordStatus | None
+    status: RecordStatus
     draft_reasons: tuple[str, ...]
     simulated: bool
-    withdrawn: str | None
     replaces: str | None
     amendment: str | None
-    laboratory: str | None
-    address: str | None
-    place: str | None
-    country: str | None
-    accreditation: str | None
-    customer: str | None
-    customer_address: str | None
     item: str
-    instrument: str
-    method: str | None
     model: str
-    phase: str | None
     adjustment: str
-    temperature_C: float | None
-    reference: str | None
-    reference_certificate: str | None
-    reference_uncertainties: tuple[tuple[str, float, float, str], ...]
-    reference_digital: DigitalSource | None
-    rule: str | None
-    interval: str | None
-    opinions: str | None
     entered_by: str
     checked_by: str | None
     approved_by: str | None
-    status: str
-    record: str
-    record_sha256: str
-    record_software: tuple[tuple[str, str], ...]
-    data: tuple[DataFile, ...]
     ledger_head: str
     signature: str
-    cells: tuple[Indication, ...]
-    resolutions: tuple[float | None, ...]
     loads: tuple[LoadResult, ...]
     gaps: tuple[str, ...]
     findings: tuple[Finding, ...]
@@ -206,11 +163,22 @@ class Certificate:
         return bool(self.draft_reasons)
 
     @property
+    def withdrawn(self) -> str | None:
+        """Why and from when the record is void; None for one that is not withdrawn."""
+        status = self.status
+        if status.state != "withdrawn":
+            return None
+        from_day = status.void_from and not status.void_always
+        void = f"void from {status.void_from}" if from_day else "void on every day"
+        day = status.known_on or "an unknown day"
+        return f"{status.id} was withdrawn on {day}, {void}: {status.reason or 'no reason stated'}"
+
+    @property
     def use(self) -> CalibrationUse:
         """The record with its standing, from which the marks of every page follow."""
         return CalibrationUse(
-            id=self.record,
-            sha256=self.record_sha256,
+            id=self.record.id,
+            sha256=self.record.sha256,
             unverified=False,
             draft_reasons=self.draft_reasons,
             since=(self.withdrawn,) if self.withdrawn else (),

@@ -64,8 +64,9 @@ def _dof(dof: float) -> str:
 )
 def cells(c: Certificate) -> Texts:
     """Return the indications."""
-    for cell, resolution in zip(c.cells, c.resolutions, strict=True):
+    for cell in c.record.cells:
         ends = or_dash(cell.minimum, ".6g"), or_dash(cell.maximum, ".6g")
+        resolution = c.statements.cell(cell.name).stated_resolution
         yield cell.name, cell.serial or GAP, printed(cell.unit), *ends, or_dash(resolution, ".6g")
 
 
@@ -106,7 +107,7 @@ def coefficients(c: Certificate) -> Texts:
 def uncertainty(c: Certificate) -> Texts:
     """Return the expanded uncertainty of every load over its range."""
     for load in c.loads:
-        full = max(abs(load.minimum), abs(load.maximum))
+        full = max(map(abs, load.ends))
         for at in load.range:
             yield (
                 load.load, round_to_uncertainty(at.at, at.U), f"{100 * at.at / full:.0f}",
@@ -133,11 +134,12 @@ def uncertainty(c: Certificate) -> Texts:
 def budget(c: Certificate) -> Texts:
     """Return the components that were stated or measured; the statement about U names the others."""
     for load in c.loads:
-        for part in load.parts:
+        for part in load.full_scale.components:
+            share = 100 * load.full_scale.share(part)
             if part.stated:
                 yield (
-                    load.load, part.name, part.evaluation, part.distribution, round_uncertainty(part.u),
-                    printed(load.unit), _dof(part.dof), f"{100 * part.share:.1f}", part.source,
+                    load.load, part.name, part.type, part.distribution, round_uncertainty(part.u),
+                    printed(load.unit), _dof(part.dof), f"{share:.1f}", part.source,
                 )  # fmt: skip
 
 
@@ -159,8 +161,9 @@ def fit(c: Certificate) -> Texts:
     """Return the reference loads and residuals of every load."""
     for load in c.loads:
         yield (
-            load.load, printed(load.unit), f"{load.minimum:g}", f"{load.maximum:g}", str(load.n),
-            str(load.dof), f"{load.residual_sd:.3g}", f"{max(load.residuals, key=abs):+.3g}",
+            load.load, printed(load.unit), *(f"{end:g}" for end in load.ends), str(len(load.references)),
+            str(load.fit.dof or 0), f"{load.fit.residual_sd or 0.0:.3g}",
+            f"{max(load.residuals, key=abs):+.3g}",
         )  # fmt: skip
 
 
@@ -254,7 +257,7 @@ def residuals(c: Certificate, _style: Style) -> Iterator[Plot]:
 
 def _plot(name: str, load: LoadResult, mark: str | None) -> Plot:
     unit = printed(load.unit)
-    ends = (load.minimum, load.maximum)
+    ends = load.ends
     # A cross-section of the budget between the loads at which it was told is straight enough to draw.
     at = tuple(e.at for e in load.range)
     curves = [
@@ -293,8 +296,8 @@ def _plot(name: str, load: LoadResult, mark: str | None) -> Plot:
         curves=tuple(curves),
         caption=f"{load.load}: deviation of the equation from the reference loads and from the check loads, "
         f"with the tolerance and the expanded uncertainty U.",
-        alt=f"Deviation of {load.load} over {load.load} from {load.minimum:g} to {load.maximum:g} {unit}: "
-        f"{load.n} fitted loads, largest residual {largest:+.3g} {unit}{checks}; tolerance "
+        alt=f"Deviation of {load.load} over {load.load} from {ends[0]:g} to {ends[1]:g} {unit}: "
+        f"{len(load.references)} fitted loads, largest residual {largest:+.3g} {unit}{checks}; tolerance "
         f"{load.tolerance:.3g} {unit}, expanded uncertainty at full scale "
         f"{round_uncertainty(load.full_scale.U)} {unit}",
         watermark=mark,

@@ -147,7 +147,7 @@ def fits(report: ReportedTest, style: Style) -> Rows:
 def calibration(report: ReportedTest, style: Style) -> Rows:
     """Return the terms of every load."""
     record = report.record
-    units = dict(zip(record.indications, record.indication_units, strict=True)) if record else {}
+    units = record.units if record else {}
     for load in record.loads if record else ():
         errors = standard_errors(record, load.load) if record else ()
         for i, term in enumerate(load.terms):

@@ -35,6 +35,7 @@ from toolkit.report.word.scan import (
     table_of,
     unbraced,
 )
+from toolkit.report.word.styles import BODY, StyleSheet
 from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
@@ -259,32 +260,12 @@ def _near(tag: Tag, words: Vocabulary) -> str:
 
 
 def _in_heading(site: Site) -> bool:
-    first = (
-        site.element
-        if site.element.tag == W_P
-        else (
-            ancestor(site.element, W_P)
-            if ancestor(site.element, W_P) is not None
-            else next(site.element.iter(W_P), None)
-        )
-    )
+    element = site.element
+    first = element if element.tag == W_P else ancestor(element, W_P)
     if first is None:
-        return False
-    style = first.find(f"{q('w:pPr')}/{q('w:pStyle')}")
-    if first.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
-        return True
-    if style is None:
-        return False
-    identity = style.get(q("w:val")) or ""
-    names = {identity.lower()}
-    styles = getattr(site.story.part, "_styles_part", None)
-    if styles is not None:
-        for style_element in styles.element.iter(q("w:style")):
-            if style_element.get(q("w:styleId")) == identity:
-                names.add((style_element.find(q("w:name")).get(q("w:val")) or "").lower())
-                if style_element.find(f"{q('w:pPr')}/{q('w:outlineLvl')}") is not None:
-                    return True
-    return any(name.startswith("heading") for name in names)
+        first = next(element.iter(W_P), None)
+    sheet = StyleSheet.of(site.story.part.package)
+    return first is not None and sheet.level_of(first) < BODY
 
 
 def _tables(sites: list[Site], words: Vocabulary) -> Iterator[LintFinding]:

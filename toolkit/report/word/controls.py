@@ -11,7 +11,10 @@ from lxml import etree
 
 from toolkit.report.tags import Tag, parse_tag
 from toolkit.report.word.scan import LITERAL, visible_texts
+from toolkit.report.word.styles import styles_root
 from toolkit.report.word.xml import (
+    P_PR,
+    R_PR,
     SDT_CONTENT,
     SDT_PR,
     W_P,
@@ -26,9 +29,10 @@ from toolkit.report.word.xml import (
     new_run,
     q,
     set_text,
+    switch_is_on,
 )
 
-P_PR, R_PR, TC_PR = q("w:pPr"), q("w:rPr"), q("w:tcPr")
+TC_PR = q("w:tcPr")
 
 
 def fill_control(sdt: Element, text: str, *, iso_date: str | None = None) -> None:
@@ -271,18 +275,13 @@ def _clear(element: Element) -> None:
 
 
 _LRM = "\u200e"
-_OFF = ("0", "false", "off")
 
 
 def from_the_right(package: Any, parts: list[Story]) -> bool:
     """Tell whether some paragraph, table or style of a document is set from right to left."""
-    styles = getattr(package.main_document_part, "_styles_part", None)
-    roots = [story.root for story in parts] + ([] if styles is None else [styles.element])
-    return any(
-        (mark.get(q("w:val")) or "1").lower() not in _OFF
-        for root in roots
-        for mark in root.iter(q("w:bidi"), q("w:bidiVisual"))
-    )
+    styles = styles_root(package)
+    roots = [story.root for story in parts] + ([] if styles is None else [styles])
+    return any(switch_is_on(mark) for root in roots for mark in root.iter(q("w:bidi"), q("w:bidiVisual")))
 
 
 def kept_whole(text: str) -> str:

@@ -29,15 +29,16 @@ from toolkit.report.word.controls import (
     replace_content,
     settle,
 )
+from toolkit.report.word.fields import number_captions
 from toolkit.report.word.filled import Entry, Filled
 from toolkit.report.word.look import must_be_read
-from toolkit.report.word.numbering import levelled, number_captions
 from toolkit.report.word.own import RED, own_paragraph
 from toolkit.report.word.package import Template, open_package, undated
 from toolkit.report.word.pages import PAGE_MARK, drop_notes, headers_shown, mark_pages, set_properties
 from toolkit.report.word.pictures import Ids, chart_run, free_height, insert_at_mark, picture_run
 from toolkit.report.word.rows import fill_table
 from toolkit.report.word.scan import Site, row_in, scan, table_of, visible_texts
+from toolkit.report.word.styles import levelled
 from toolkit.report.word.toc import write_contents
 from toolkit.report.word.xml import (
     W_P,

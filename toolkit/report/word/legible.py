@@ -10,7 +10,6 @@ from what is around it.
 from __future__ import annotations
 
 import io
-import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from toolkit.arrays import Array
-from toolkit.errors import RenderError
 from toolkit.inputs import PDF_FILE, read_input
+from toolkit.report.word.poppler import page_picture
 from toolkit.report.word.preview import Word, words_of
 from toolkit.report.word.toc_pages import squeeze
 
@@ -107,14 +106,8 @@ class Print:
         """Return the luminance of a page, 0 to 1 (rows, columns)."""
         from PIL import Image
 
-        command = ["pdftoppm", "-r", str(_DPI), "-f", str(number), "-l", str(number), str(self.pdf)]
-        try:
-            process = subprocess.run(command, capture_output=True, timeout=120, check=False)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise _not_drawn(number, str(error)) from error
-        if process.returncode or not process.stdout:
-            raise _not_drawn(number, process.stderr.decode(errors="replace")[:500] or "nothing")
-        with Image.open(io.BytesIO(process.stdout)) as image:
+        picture = page_picture(self.pdf, number, dpi=_DPI, png=False)
+        with Image.open(io.BytesIO(picture)) as image:
             colours = np.asarray(image.convert("RGB"), dtype=np.uint8)
         return np.asarray(_LINEAR[colours] @ np.array([0.2126, 0.7152, 0.0722]))
 
@@ -169,11 +162,3 @@ def _linear() -> Array:
 
 
 _LINEAR = _linear()
-
-
-def _not_drawn(number: int, got: str) -> RenderError:
-    return RenderError(
-        "a page cannot be drawn, so that nobody knows what is seen on it", where=f"PDF, page {number}",
-        got=got, expected="a picture by pdftoppm",
-        next_step="run 'toolkit doctor': it prints what installs poppler-utils", rule="no-poppler",
-    )  # fmt: skip

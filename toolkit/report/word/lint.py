@@ -18,8 +18,10 @@ from urllib.parse import unquote
 from lxml import etree
 
 from toolkit.report.style import Style
+from toolkit.report.word.fields import fields_of
 from toolkit.report.word.pages import headers_shown
 from toolkit.report.word.scan import LITERAL, Site, control_tag, place_of
+from toolkit.report.word.styles import StyleSheet
 from toolkit.report.word.toc import can_update, contents_fields
 from toolkit.report.word.xml import (
     SDT_CONTENT,
@@ -31,7 +33,6 @@ from toolkit.report.word.xml import (
     ancestor,
     parser,
     q,
-    walk_fields,
 )
 
 RULES = {
@@ -123,7 +124,8 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
         for element in story.root.iter(q("w:commentReference")):
             yield at_element("comments", story, element, "a comment will stand in the report")
             break
-        for element, code in walk_fields(story.root):
+        for field in fields_of(story.root):
+            element, code = field.begin, field.whole
             word = code.split()[0].upper() if code.split() else ""
             if word in ("DATE", "TIME"):
                 yield at_element(
@@ -152,7 +154,7 @@ def surroundings(package: object, parts: list[Story], style: Style) -> Iterator[
     yield from _unreached(package, parts)
     for story in parts:
         yield from _aside(story)
-    names = _style_names(package)
+    names = set(StyleSheet.of(package).names.values())
     for use, name in style.styles:
         if name.lower() not in names:
             yield LintFinding(
@@ -215,15 +217,6 @@ def _touches_a_tag(pieces: list[tuple[str, bool]]) -> bool:
     return any(tag.start() < place < tag.end() for tag in LITERAL.finditer(remains) for place in places)
 
 
-def _style_names(package: object) -> set[str]:
-    main = package.main_document_part  # type: ignore[attr-defined]
-    return {
-        (style.find(q("w:name")).get(q("w:val")) or "").lower()
-        for style in main._styles_part.element.iter(q("w:style"))
-        if style.find(q("w:name")) is not None
-    }
-
-
 _TAG = re.compile(r"\{\{\s*tk:")
 _WHOLE_TAG = re.compile(rf"{LITERAL.pattern}|{_TAG.pattern}")
 _TEXTS = ("t", "v")  # a:t of drawings and diagrams, m:t of formulas, c:v of charts
@@ -263,7 +256,7 @@ def _aside(story: Story) -> Iterator[LintFinding]:
         if element.tag != q("w:alias") and any(_TAG.search(str(value)) for value in element.attrib.values())
     ]
     findings += [
-        (element, "the code of a field") for element, code in walk_fields(story.root) if _TAG.search(code)
+        (field.begin, "the code of a field") for field in fields_of(story.root) if _TAG.search(field.whole)
     ]
     targets = {rel.rId for rel in story.part.rels.values() if _TAG.search(unquote(rel.target_ref))}
     findings += [

@@ -16,18 +16,17 @@ from lxml import etree
 from toolkit.report.content import SIGNATURE
 from toolkit.report.style import Style
 from toolkit.report.vocabulary import Vocabulary
-from toolkit.report.word.controls import P_PR, R_PR, TC_PR, run_properties
+from toolkit.report.word.controls import TC_PR, run_properties
 from toolkit.report.word.lint import LintFinding
 from toolkit.report.word.scan import LITERAL, Site, visible_texts
 from toolkit.report.word.styles import paragraph_styles, style_chain, style_defaults
-from toolkit.report.word.xml import W_P, W_R, W_TC, Element, ancestor, parser, q
+from toolkit.report.word.xml import P_PR, R_PR, W_P, W_R, W_TC, Element, ancestor, parser, q, switch_is_on
 
 LEAST_SIZE = 7  # half-points
 _LEAST_SCALE = 30  # percent
 _LEAST_LINE = 80  # twips, of a line of exact height
 _CONTRAST = 1.5
 _HIDDEN = ("w:vanish", "w:webHidden", "w:specVanish")
-_OFF = ("0", "false", "off")
 _HEX = re.compile(r"[0-9A-Fa-f]{6}")
 _DEFAULT_SIZE = 20  # half-points, of a document that states none
 # Names of theme colours in a document -> in the theme.
@@ -78,7 +77,7 @@ class _Looks:
         paragraph = next(site.element.iter(W_P), None) if paragraph is None else paragraph
         styles = [] if paragraph is None else [*self._of_paragraph(paragraph)]
         for name in _HIDDEN:
-            if (hidden := self._first(name, properties)) is not None and _on(hidden):
+            if (hidden := self._first(name, properties)) is not None and switch_is_on(hidden):
                 return f"its text is hidden ({name})"
         size = self._number("w:sz", properties, _DEFAULT_SIZE)
         if size < LEAST_SIZE:
@@ -178,10 +177,6 @@ class _Looks:
                     if _HEX.fullmatch(colour.get("lastClr") or colour.get("val") or "")
                 }
         return {}
-
-
-def _on(element: Element) -> bool:
-    return (element.get(q("w:val")) or "1").lower() not in _OFF
 
 
 def _number(text: str | None, default: float) -> float:

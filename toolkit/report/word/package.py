@@ -20,7 +20,8 @@ from toolkit.errors import TemplateError
 from toolkit.files import sha256_bytes
 from toolkit.inputs import TEMPLATE_FILE, read_input
 from toolkit.recording.sniff import ole_kind, sniff
-from toolkit.report.word.xml import Element, parser, q, walk_fields
+from toolkit.report.word.fields import fields_of
+from toolkit.report.word.xml import Element, parser, q
 
 _KIND = "application/vnd.openxmlformats-officedocument.wordprocessingml.{}+xml"
 DOCUMENT, TEMPLATE = _KIND.format("document.main"), _KIND.format("template.main")
@@ -367,7 +368,8 @@ def _check_member(path: Path, name: str, data: bytes, root_of: RootOf) -> None:
                 raise _refuse(
                     path, "external-content", "a drawing names external content", where=name, got=source
                 )
-    for _, code in walk_fields(root):
+    for field in fields_of(root):
+        code = field.whole
         link = _HYPERLINK.match(code)
         leads = "" if link is None else link[1] or link[3] or ""
         if _FIELDS.search(code.strip()) or (leads and not _ANYWHERE.match(leads)):

@@ -14,11 +14,10 @@ from toolkit.recording.marks import output_keywords
 from toolkit.report.content import ReportContent
 from toolkit.report.word.own import RED, own_paragraph
 from toolkit.report.word.scan import LITERAL, visible_texts
-from toolkit.report.word.xml import W_P, Element, Story, clean, element, in_fallback, q
+from toolkit.report.word.xml import W_P, Element, Story, clean, element, in_fallback, q, switch_is_on
 from toolkit.version import __version__
 
 _NOTES = ("footnote", "endnote")
-_OFF = ("0", "false", "off")
 
 
 def headers_shown(
@@ -112,7 +111,7 @@ def settings_of(main: Any) -> Any:
 def switched_on(element: Any, name: str) -> bool:
     """Tell whether a child that is a switch is on."""
     found = None if element is None else element.find(q(name))
-    return found is not None and (found.get(q("w:val")) or "1").lower() not in _OFF
+    return found is not None and switch_is_on(found)
 
 
 # A line that stands on every page of a document, whatever its template: it goes in by the toolkit.

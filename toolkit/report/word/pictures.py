@@ -22,14 +22,27 @@ from toolkit.report.word.chart import (
     chart_texts,
     chart_xml,
 )
-from toolkit.report.word.controls import P_PR
 from toolkit.report.word.scan import own_rows
 from toolkit.report.word.styles import paragraph_styles
-from toolkit.report.word.xml import NS, W_P, W_R, W_T, W_TBL, W_TC, W_TR, Element, Story, ancestor, clean, q
+from toolkit.report.word.xml import (
+    NS,
+    P_PR,
+    W_P,
+    W_R,
+    W_T,
+    W_TBL,
+    W_TC,
+    W_TR,
+    Element,
+    Story,
+    ancestor,
+    clean,
+    is_on,
+    q,
+)
 
 EMU_TWIP, EMU_INCH = 635, 914400
 _VML_EMU = {"pt": 12700, "in": 914400, "cm": 360000, "mm": 36000, "px": 9525}
-_OFF = ("0", "false", "off")
 _CELL_MARGIN = 2 * 108
 _LETTER = (12240, 15840, 1440)
 
@@ -339,7 +352,7 @@ def section_room(section: Element) -> tuple[int, int]:
         - number(margin, "bottom", _LETTER[2])
     )
     own = [number(column, "w", width) for column in section.iter(q("w:col"))]
-    if own and columns.get(q("w:equalWidth")) in _OFF:
+    if own and not is_on(columns.get(q("w:equalWidth")) or "1"):
         return min(own), int(height * 0.92)  # it does not say in which of them
     count = max(number(columns, "num", 1), 1)
     return (width - (count - 1) * number(columns, "space", 720)) // count, int(height * 0.92)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import html
 import io
 import re
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from toolkit.errors import RenderError
+from toolkit.report.word import poppler as programs
 from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.poppler import poppler
 from toolkit.report.word.scan import own_rows
-from toolkit.report.word.toc_pages import poppler
 from toolkit.report.word.xml import W_P, W_TBL, XML_SPACE, Element, Story, new_run, q, stories, write_back
 
 _PAGE = re.compile(r'<page width="([0-9.]+)" height="([0-9.]+)">(.*?)</page>', re.DOTALL)
@@ -89,28 +88,14 @@ def _places(words: list[Word], mark_words: list[str]) -> list[tuple[float, float
 
 
 def page_picture(pdf: Path, page: int) -> bytes:
-    """Return one page (from 1) as PNG.
+    """Return one page (from 1) as PNG, as a screen shows it.
 
     Raises
     ------
     RenderError
-        ``no-poppler``: poppler cannot draw it
+        poppler cannot draw it
     """
-    words = ["pdftoppm", "-png", "-r", str(_DPI), "-f", str(page), "-l", str(page), "-singlefile", str(pdf)]
-    try:
-        process = subprocess.run(words, capture_output=True, timeout=120, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise _not_drawn(pdf, page, str(error)) from error
-    if process.returncode or not process.stdout:
-        raise _not_drawn(pdf, page, process.stderr.decode(errors="replace")[:500] or "nothing")
-    return process.stdout
-
-
-def _not_drawn(pdf: Path, page: int, got: str) -> RenderError:
-    return RenderError(
-        "a page cannot be drawn", where=f"{pdf}, page {page}", got=got, expected="a picture by pdftoppm",
-        next_step="run 'toolkit doctor': it prints what installs poppler-utils", rule="no-poppler",
-    )  # fmt: skip
+    return programs.page_picture(pdf, page, dpi=_DPI)
 
 
 _PLACE = re.compile(r"(paragraph|table) (\d+)(?:, row (\d+))?\Z")

@@ -14,13 +14,25 @@ import unicodedata
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, islice
 
 from lxml import etree
 
 from toolkit.report.word.filled import Filled, parts_of
+from toolkit.report.word.styles import properties_of, styles_by_id
 from toolkit.report.word.toc_pages import squeeze
-from toolkit.report.word.xml import W_P, W_T, W_TR, Element, ancestor, in_fallback, parser, q
+from toolkit.report.word.xml import (
+    R_PR,
+    W_P,
+    W_T,
+    W_TR,
+    Element,
+    ancestor,
+    in_fallback,
+    parser,
+    q,
+    switch_is_on,
+)
 
 _LONG = 12  # characters, of a text that hardly stands by chance in another one
 _NEAR = 4000  # characters, within which the next text is looked for
@@ -161,29 +173,19 @@ class _Reader:
         return bool(named & self.vanished) or (properties is not None and _hides(properties))
 
 
-def _hides(properties: Element) -> bool:
-    mark = properties.find(q("w:vanish"))
-    return mark is not None and (mark.get(q("w:val")) or "1").lower() not in ("0", "false", "off")
+def _hides(*properties: Element) -> bool:
+    """Tell whether text is hidden by the first of these properties that say so or otherwise."""
+    marks = (mark for of in properties if (mark := of.find(q("w:vanish"))) is not None)
+    return any(switch_is_on(mark) for mark in islice(marks, 1))
 
 
 def _vanished(archive: zipfile.ZipFile) -> frozenset[str]:
     """Return the ids of the styles whose text nobody sees, by themselves or by what they are based on."""
-    names = [name for name in archive.namelist() if name.endswith("/styles.xml")]
-    based: dict[str, str] = {}
     hidden: set[str] = set()
-    for name in names:
-        for style in etree.fromstring(archive.read(name), parser()).iter(q("w:style")):
-            identity = style.get(q("w:styleId")) or ""
-            properties, base = style.find(q("w:rPr")), style.find(q("w:basedOn"))
-            if properties is not None and _hides(properties):
-                hidden.add(identity)
-            if base is not None:
-                based[identity] = base.get(q("w:val")) or ""
-    for _ in based:
-        more = {name for name, base in based.items() if base in hidden} - hidden
-        if not more:
-            break
-        hidden |= more
+    for name in archive.namelist():
+        if name.endswith("/styles.xml"):
+            styles = styles_by_id(etree.fromstring(archive.read(name), parser()))
+            hidden |= {identity for identity in styles if _hides(*properties_of(identity, styles, R_PR))}
     return frozenset(hidden)
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 
 from toolkit.report.tags import DRAWN, Tag, parse_tag
 from toolkit.report.word.package import Template, open_package
+from toolkit.report.word.styles import styles_root
 from toolkit.report.word.xml import (
     SDT_CONTENT,
     SDT_PR,
@@ -203,9 +204,8 @@ def in_language(template: Template, language: str) -> bytes:
         set_text(element, text.replace(phrase, book.say(phrase)))
     for story in parts:
         write_back(story)
-    styles = getattr(package.main_document_part, "_styles_part", None)
-    if styles is not None:
-        for mark in styles.element.iter(q("w:lang")):
+    if (styles := styles_root(package)) is not None:
+        for mark in styles.iter(q("w:lang")):
             mark.set(q("w:val"), locale_of(language))
     package.core_properties.language = locale_of(language)
     stream = io.BytesIO()

@@ -11,10 +11,11 @@ import re
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
 
-from toolkit.report.word.numbering import StyleSheet, headings, style_of
+from toolkit.report.word.fields import CHAR, CODE, Field, fields_of
+from toolkit.report.word.styles import StyleSheet, headings, style_of
 from toolkit.report.word.xml import (
+    P_PR,
     W_P,
     Element,
     ancestor,
@@ -26,36 +27,10 @@ from toolkit.report.word.xml import (
     text_run,
 )
 
-_CHAR, _INSTR, _TYPE = q("w:fldChar"), q("w:instrText"), q("w:fldCharType")
-_P_PR = q("w:pPr")
 _BEFORE_TABS = (
     "pStyle keepNext keepLines pageBreakBefore framePr widowControl numPr suppressLineNumbers pBdr shd"
 )
 _INDENT = 220  # twips a level, where the template has no style for an entry
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContentsField:
-    """A TOC field of the body: its code and the elements that bound it."""
-
-    code: str
-    begin: Element
-    separate: Element | None
-    end: Element
-
-    @property
-    def paragraphs(self) -> list[Element] | None:
-        """The paragraphs that it fills, from first to last; None where they are no neighbours."""
-        first, last = ancestor(self.begin, W_P), ancestor(self.end, W_P)
-        if first is None or last is None or first.getparent() is not last.getparent():
-            return None
-        members = [first]
-        while members[-1] is not last:
-            following = members[-1].getnext()
-            if following is None:
-                return None
-            members.append(following)
-        return members
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,27 +49,12 @@ class ContentsEntry:
     paged: bool
 
 
-def contents_fields(root: Element) -> list[ContentsField]:
+def contents_fields(root: Element) -> list[Field]:
     """Return the TOC fields of a body, in their order."""
-    fields: list[ContentsField] = []
-    stack: list[list[Any]] = []
-    for mark in root.iter(_CHAR, _INSTR):
-        kind = mark.get(_TYPE)
-        if mark.tag == _INSTR:
-            if stack and stack[-1][2] is None:
-                stack[-1][1] += mark.text or ""
-        elif kind == "begin":
-            stack.append([mark, "", None])
-        elif kind == "separate" and stack:
-            stack[-1][2] = mark
-        elif kind == "end" and stack:
-            begin, code, separate = stack.pop()
-            if code.split()[:1] and code.split()[0].upper() == "TOC":
-                fields.append(ContentsField(code=code, begin=begin, separate=separate, end=mark))
-    return fields
+    return [field for field in fields_of(root) if field.words[0] == "TOC" and field.end is not None]
 
 
-def can_update(field: ContentsField) -> bool:
+def can_update(field: Field) -> bool:
     """Tell whether the field's switches and place are among those that are written here.
 
     Not: entries marked by TC fields (``\\f``, ``\\l``), or from one bookmark only (``\\b``).
@@ -172,14 +132,12 @@ class _Bookmarks:
         )
         identity = str(next(self.ids))
         start = element("w:bookmarkStart", id=identity, name=name)
-        paragraph.insert(1 if paragraph.find(_P_PR) is not None else 0, start)
+        paragraph.insert(1 if paragraph.find(P_PR) is not None else 0, start)
         paragraph.append(element("w:bookmarkEnd", id=identity))
         return name
 
 
-def _entries(
-    field: ContentsField, root: Element, sheet: StyleSheet, marks: _Bookmarks
-) -> list[ContentsEntry]:
+def _entries(field: Field, root: Element, sheet: StyleSheet, marks: _Bookmarks) -> list[ContentsEntry]:
     paged = re.search(r"\\n(?!\w)", field.code) is None
     caption = re.search(r'\\[ca]\s+"?([^"\\\s]+)', field.code)
     if caption:
@@ -235,15 +193,13 @@ def _switches(code: str) -> tuple[int, int, dict[str, int], bool]:
 
 
 def _counts(paragraph: Element, name: str) -> bool:
-    codes = "".join(e.text or "" for e in paragraph.iter(_INSTR)) + " ".join(
-        e.get(q("w:instr")) or "" for e in paragraph.iter(q("w:fldSimple"))
-    )
-    return re.search(rf"\bSEQ\s+{re.escape(name)}(?!\w)", codes, re.IGNORECASE) is not None
+    counted = re.compile(rf"\s*SEQ\s+{re.escape(name)}(?!\w)", re.IGNORECASE)
+    return any(counted.match(field.code) for field in fields_of(paragraph))
 
 
-def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleSheet, root: Element) -> None:
+def _rewrite(field: Field, entries: list[ContentsEntry], sheet: StyleSheet, root: Element) -> None:
     old = field.paragraphs or []
-    patterns = {style_of(p): p.find(_P_PR) for p in reversed(old) if p.find(_P_PR) is not None}
+    patterns = {style_of(p): p.find(P_PR) for p in reversed(old) if p.find(P_PR) is not None}
     first, last = old[0], old[-1]
     before = _siblings_before(first, field.begin)
     tail = _tail(last, field.end)
@@ -255,8 +211,8 @@ def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleShe
     ]
     if not paragraphs:
         paragraphs = [element("w:p")]
-    head = [*before, field_mark("begin"), text_run(field.code, _INSTR), field_mark("separate")]
-    at = 1 if paragraphs[0].find(_P_PR) is not None else 0
+    head = [*before, field_mark("begin"), text_run(field.code, CODE), field_mark("separate")]
+    at = 1 if paragraphs[0].find(P_PR) is not None else 0
     for offset, run in enumerate(head):
         paragraphs[0].insert(at + offset, run)
     paragraphs[-1].append(field_mark("end"))
@@ -269,12 +225,12 @@ def _rewrite(field: ContentsField, entries: list[ContentsEntry], sheet: StyleShe
 
 
 def _siblings_before(paragraph: Element, begin: Element) -> list[Element]:
-    run = next(child for child in paragraph if child is begin.getparent() or begin in child.iter(_CHAR))
+    run = next(child for child in paragraph if child is begin.getparent() or begin in child.iter(CHAR))
     siblings: list[Element] = []
     for child in paragraph:
         if child is run:
             return siblings
-        if child.tag != _P_PR:
+        if child.tag != P_PR:
             siblings.append(child)
     return siblings
 
@@ -284,11 +240,11 @@ def _tail(paragraph: Element, end: Element) -> Element | None:
     tail = deepcopy(paragraph)
     position = list(paragraph.iter()).index(end)
     twin = list(tail.iter())[position]
-    for run in [c for c in tail if c.tag != _P_PR]:
+    for run in [c for c in tail if c.tag != P_PR]:
         tail.remove(run)
         if run is twin or twin in run.iter():
             break
-    section = tail.find(f"{_P_PR}/{q('w:sectPr')}") is not None
+    section = tail.find(f"{P_PR}/{q('w:sectPr')}") is not None
     has_content = any(True for _ in tail.iter(q("w:br"), q("w:drawing")))
     return tail if section or has_content or paragraph_text(tail).strip() else None
 
@@ -318,7 +274,7 @@ def _line(
         runs += [
             element("w:r", element("w:tab")) if separator == "\t" else text_run(separator),
             field_mark("begin"),
-            text_run(f" PAGEREF {entry.bookmark} \\h ", _INSTR),
+            text_run(f" PAGEREF {entry.bookmark} \\h ", CODE),
             field_mark("separate"),
             text_run("1"),
             field_mark("end"),

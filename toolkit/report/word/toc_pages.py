@@ -19,6 +19,7 @@ from toolkit.inputs import PDF_FILE, read_input
 from toolkit.report.word.bulk import with_rows, without_rows
 from toolkit.report.word.filled import Filled
 from toolkit.report.word.office import Office
+from toolkit.report.word.poppler import poppler
 from toolkit.report.word.toc import ContentsEntry, contents_fields
 from toolkit.report.word.xml import SDT_CONTENT, SDT_PR, W_P, W_R, W_SDT, W_T, Element, ancestor, parser, q
 
@@ -152,37 +153,6 @@ def pdf_text(pdf: Path, *, layout: bool = False) -> str:
         plain = Path(folder) / "text.pdf"
         plain.write_bytes(read_input(pdf, PDF_FILE).replace(b"/OutputIntents", b"/OutputIntent_"))
         return poppler(["pdftotext", "-layout" if layout else "-raw", "-enc", "UTF-8", str(plain), "-"])
-
-
-def poppler(command: list[str]) -> str:
-    """Return what one of poppler's programs prints.
-
-    Raises
-    ------
-    RenderError
-        ``no-poppler``: it is not installed; ``render-timeout``: it does not end
-    """
-    try:
-        process = subprocess.run(command, capture_output=True, timeout=120, check=False)
-    except FileNotFoundError as error:
-        raise RenderError(
-            "the PDF cannot be verified",
-            where=command[0],
-            got="no program of that name on the PATH",
-            expected="poppler's pdftotext, pdffonts and pdfinfo",
-            next_step="run 'toolkit doctor': it prints the command that installs poppler-utils",
-            rule="no-poppler",
-        ) from error
-    except subprocess.TimeoutExpired as error:
-        raise RenderError(
-            "the PDF cannot be verified in time",
-            where=command[0],
-            got="no end after 120 s",
-            expected="an answer",
-            next_step="open the PDF; try again with --keep",
-            rule="render-timeout",
-        ) from error
-    return process.stdout.decode("utf-8", "replace")
 
 
 def pdf_outline(pdf: Path) -> list[tuple[str, int]]:

@@ -18,9 +18,10 @@ from toolkit.report.word.filled import Filled, text_elements
 from toolkit.report.word.fonts import undrawn
 from toolkit.report.word.legible import seen
 from toolkit.report.word.pages import PAGE_MARK
+from toolkit.report.word.poppler import poppler
 from toolkit.report.word.printed import hard_to_extract, unprinted
 from toolkit.report.word.scan import BROKEN, LITERAL, control_tag
-from toolkit.report.word.toc_pages import pdf_outline, pdf_text, poppler, printed_pages, squeeze, titles_of
+from toolkit.report.word.toc_pages import pdf_outline, pdf_text, printed_pages, squeeze, titles_of
 from toolkit.report.word.xml import SDT_PR, W_P, W_SDT, clean, in_fallback, paragraph_text, q
 
 _LONG, _UNBROKEN = 40, 20  # characters of prose, and of one word, that a page's end may cut

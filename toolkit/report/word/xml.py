@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -39,8 +38,19 @@ def q(name: str) -> str:
 
 
 W_P, W_R, W_T, W_TBL, W_TR, W_TC, W_SDT = (q(f"w:{one}") for one in "p r t tbl tr tc sdt".split())
+P_PR, R_PR = q("w:pPr"), q("w:rPr")
 SDT_PR, SDT_CONTENT = q("w:sdtPr"), q("w:sdtContent")
 FALLBACK = q("mc:Fallback")
+
+
+def is_on(stated: str) -> bool:
+    """Tell whether a switch is on, as an attribute states it."""
+    return stated.lower() not in ("0", "false", "off")
+
+
+def switch_is_on(switch: Element) -> bool:
+    """Tell whether an element that is a switch is on: by itself it is."""
+    return is_on(switch.get(q("w:val")) or "1")
 
 
 def parser() -> etree.XMLParser:
@@ -208,28 +218,3 @@ def _mark_right_to_left(run: Element) -> None:
         properties.append(mark)
     else:
         later.addprevious(mark)
-
-
-def walk_fields(root: Element) -> Iterator[tuple[Element, str]]:
-    """Yield (element, code) of every field, simple or complex, nested codes joined in."""
-    for simple in root.iter(q("w:fldSimple")):
-        yield simple, simple.get(q("w:instr")) or ""
-    stack: list[tuple[Element, list[str], bool]] = []
-    for element in root.iter(q("w:fldChar"), q("w:instrText")):
-        if element.tag == q("w:instrText"):
-            for _, codes, open_ in stack:
-                if open_:
-                    codes.append(element.text or "")
-            if not stack:
-                yield element, element.text or ""
-            continue
-        kind = element.get(q("w:fldCharType"))
-        if kind == "begin":
-            stack.append((element, [], True))
-        elif kind == "separate" and stack:
-            stack[-1] = (stack[-1][0], stack[-1][1], False)
-        elif kind == "end" and stack:
-            begin, codes, _ = stack.pop()
-            yield begin, "".join(codes)
-    for begin, codes, _ in stack:
-        yield begin, "".join(codes)
