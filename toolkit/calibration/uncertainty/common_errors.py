@@ -36,12 +36,8 @@ import numpy as np
 from toolkit.arrays import Array
 from toolkit.calibration.records.record import CalibrationRecord, LoadFit
 from toolkit.calibration.session.statements import Statements, statements_of
-<<<<<<< HEAD
-from toolkit.calibration.terms import INTERCEPT, term_matrix
-from toolkit.findings import Finding
-=======
 from toolkit.calibration.terms import INTERCEPT
->>>>>>> 22a8437aeebfcd9bdbd3ec3a64077153fce7233c
+from toolkit.findings import Finding
 
 _STEP = 1e-5
 

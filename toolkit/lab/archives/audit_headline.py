@@ -162,33 +162,10 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
         kind, repair = judged_of(file), file["repair"]
         judged[kind] += 1
         notes = {note["rule"] for note in file.get("notes", ())}
-<<<<<<< HEAD
-        impossible += unchanged and bool(notes & {*RULES})
-        if file["grade"] == "no_recording":
-            no_recording += 1
-        elif file["grade"] == "unreadable":
-            unreadable += 1
-        elif file["grade"] in CLEAN:
-            stepping += "discontinuity" in notes
-            copies += "corrected-copy" in notes
-        elif file["grade"] == "altered_cells":
-            altered += 1
-        elif disputed(file):
-            open_files += 1
-        elif repair is None:
-            unjudged += 1
-        elif repair["FY_max_abs_N"] is None and repair["MZ_max_abs_Nm"] is None:
-            bare += 1
-        elif file["grade"] in ("stale", "ambiguous") and _is_small(repair):
-            small += 1
-        else:
-            wrong += 1
-=======
         impossible += (repair is None or kind == "right") and bool(notes & {*RULES})
         stepping += kind == "right" and "discontinuity" in notes
         copies += kind == "right" and "corrected-copy" in notes
         if kind == "wrong":
->>>>>>> 22a8437aeebfcd9bdbd3ec3a64077153fce7233c
             cause = _cause_of(file)
             causes[cause] += 1
             if (repair["FY_max_abs_N"] or 0.0) > FY:
@@ -213,7 +190,8 @@ def headline_of(files: Iterable[Mapping[str, Any]]) -> Headline:
 def judged_of(file: Mapping[str, Any]) -> Judged:
     """Return what a file of an audit is, by its line of the answer: the one rule of every list and count.
 
-    ``small``: a record that was not in force computed it, and the one in force changes less than is printed.
+    ``small``: a record that was not in force computed it, or may have, and the one in force changes less than
+    is printed.
     """
     grade, repair = file["grade"], file["repair"]
     if grade == "no_recording" or grade == "unreadable":
@@ -230,7 +208,7 @@ def judged_of(file: Mapping[str, Any]) -> Judged:
     if FY is None and MZ is None:
         return "bare"
     is_small = max((FY or 0.0) / SMALL_FY_N, (MZ or 0.0) / SMALL_MZ_Nm) < 1.0
-    return "small" if grade == "stale" and is_small else "wrong"
+    return "small" if grade in ("stale", "ambiguous") and is_small else "wrong"
 
 
 def _cause_of(file: Mapping[str, Any]) -> str:
