@@ -10,8 +10,8 @@ import re
 from typing import TYPE_CHECKING
 
 from toolkit.estimate import round_uncertainty
-from toolkit.report.certificate.model import VERDICTS, Certificate
-from toolkit.report.certificate.statements import RULES
+from toolkit.report.certificate.model import Certificate
+from toolkit.report.certificate.statements import RULES, VERDICTS
 from toolkit.report.content import ReportContent
 from toolkit.report.document import Document
 from toolkit.report.style import Style

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from toolkit.calibration.records.use import CalibrationUse
+from toolkit.report.certificate.statements import VERDICTS
 
 if TYPE_CHECKING:
     from toolkit.calibration.records.record import CalibrationRecord, LoadFit
@@ -19,18 +20,10 @@ if TYPE_CHECKING:
     from toolkit.calibration.session.statements import Statements
     from toolkit.calibration.uncertainty.model import Budget
     from toolkit.findings import Finding
-    from toolkit.report.certificate.statements import Stated
+    from toolkit.report.certificate.statements import Stated, Verdict
 
 # Loads of a certificate that have a picture.
 MOST_FIGURES = 6
-
-Verdict = Literal["pass", "conditionalPass", "conditionalFail", "fail"]
-VERDICTS: dict[str, str] = {
-    "pass": "pass",
-    "conditionalPass": "conditional pass",
-    "conditionalFail": "conditional fail",
-    "fail": "fail",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

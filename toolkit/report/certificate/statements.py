@@ -9,15 +9,22 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from toolkit.calibration.session.certificate import TEXTS, certificate_faults, rule_of
 from toolkit.days import parse_day
 from toolkit.declared import Fault
 from toolkit.errors import ConfigError
 from toolkit.findings import Finding
-from toolkit.report.certificate.model import Verdict
 from toolkit.report.style import Style
+
+Verdict = Literal["pass", "conditionalPass", "conditionalFail", "fail"]
+VERDICTS: dict[str, str] = {
+    "pass": "pass",
+    "conditionalPass": "conditional pass",
+    "conditionalFail": "conditional fail",
+    "fail": "fail",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

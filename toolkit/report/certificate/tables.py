@@ -12,7 +12,8 @@ from toolkit.estimate import round_to_uncertainty, round_uncertainty
 from toolkit.files import reads_as_number
 from toolkit.listing import or_dash
 from toolkit.report.certificate.content import CERTIFICATE, GAP, signed
-from toolkit.report.certificate.model import MOST_FIGURES, VERDICTS, Certificate, LoadResult
+from toolkit.report.certificate.model import MOST_FIGURES, Certificate, LoadResult
+from toolkit.report.certificate.statements import VERDICTS
 from toolkit.report.content import Cell, Curve, Plot
 from toolkit.report.document import DeclaredTable, Rows
 from toolkit.report.style import Style
