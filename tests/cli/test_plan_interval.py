@@ -98,7 +98,7 @@ def test_what_cannot_be_planned_is_an_error(tmp_path: Path) -> None:
         ("--reliability", "1"),
         ("--reliability", "0.2"),
         ("--tests", "-1"),
-        ("--tests", "1e300"),
+        ("--tests", "1e50"),
     ):
         with pytest.raises(ToolkitError) as refused:
             run(home, *arguments)
