@@ -1,7 +1,8 @@
-"""Laws of an equation that its prediction errors propose, from row to row along the recording.
+"""Laws of an equation as they show where the plant was, and not where a refit without them has gone.
 
 Where something large is missing, a refit has driven the parameters off, and the free simulation is elsewhere
-than the plant: a limit of what it can no longer reach does not show there. Along the recording it does.
+than the plant: a limit of what it can no longer reach does not show there. From row to row along the
+recording it does, and beside a first law that has led the simulation back.
 """
 
 from __future__ import annotations
