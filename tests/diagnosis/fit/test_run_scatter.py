@@ -94,13 +94,13 @@ def test_unseen_rows_are_told_by_fits_that_have_their_values_as_the_told_one(tmp
     made = fit(problem, (drift,))
     folds = folds_of(problem, made)
     held_out = hold_out(problem, folds, made.active, made)
-    told = held_out_beside_scatter(problem, folds, held_out)
+    told = held_out_beside_scatter(problem, held_out)
     assert told.scores == held_out.scores
     for k, rows in enumerate(problem.slices):
         four = problem_of(case, model_of(case, None, None))
         for i in range(rows.start, rows.stop):
             four.kept["F"][i] = False
-        beside = with_run_scatter(four, held_out.fits[k])[0]
+        beside = with_run_scatter(four, held_out.fits[k][1])[0]
         assert told.simulated["F"][rows] == pytest.approx(beside.simulated["F"][rows], abs=1e-9)
     assert np.abs(told.simulated["F"] - held_out.simulated["F"]).max() > 1e-3
 
@@ -111,5 +111,5 @@ def test_unseen_rows_of_runs_that_are_alike_stay(tmp_path):
     made = fit(problem, ())
     folds = folds_of(problem, made)
     held_out = hold_out(problem, folds, (), made)
-    told = held_out_beside_scatter(problem, folds, held_out)
+    told = held_out_beside_scatter(problem, held_out)
     assert np.array_equal(told.simulated["F"], held_out.simulated["F"])

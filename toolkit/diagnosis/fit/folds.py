@@ -100,11 +100,14 @@ def _own_parameters(problem: Problem, fit: Fit) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeldOut:
-    """A hypothesis on rows that it has not seen: log score of each fold, and its simulation of those rows."""
+    """A hypothesis on rows that it has not seen: log score of each fold, and its simulation of those rows.
+
+    ``fits`` are rows and the fit that has not seen them, one for a fold, or for each part of it.
+    """
 
     scores: tuple[float, ...]
     simulated: dict[str, Array]
-    fits: tuple[Fit, ...]
+    fits: tuple[tuple[NDArray[np.bool_], Fit], ...]
 
     @property
     def total(self) -> float:
@@ -114,7 +117,8 @@ class HeldOut:
 
 def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], start: Fit) -> HeldOut:
     """Fit a hypothesis without each fold and score it there; the simulation is free over whole runs."""
-    fits = []
+    fits: list[tuple[NDArray[np.bool_], Fit]] = []
+    of_folds = []
     # Every fold starts where all rows led: the simulation's derivatives there are the same for all of them.
     around = Derivatives(Space.of(problem, tuple(active)))
     around.anew(around.space.begin(start.p))
@@ -130,15 +134,16 @@ def hold_out(problem: Problem, folds: Folds, active: Sequence[AppliedEffect], st
             for part in parts
         ]  # fmt: skip
         trained = _joined(of_parts, parts)
-        fits.append(trained)
+        fits += zip(parts, of_parts, strict=True)
+        of_folds.append(trained)
         for name in problem.names:
             simulated[name][mask] = trained.simulated[name][mask]
-    scores = np.zeros(len(fits))
-    pasts = [past_responses(problem, trained) for trained in fits]
+    scores = np.zeros(len(of_folds))
+    pasts = [past_responses(problem, trained) for trained in of_folds]
     for name in problem.names:
         unseen = [
             (k, run)
-            for k, (mask, trained) in enumerate(zip(folds.held, fits, strict=True))
+            for k, (mask, trained) in enumerate(zip(folds.held, of_folds, strict=True))
             for run in _unseen(problem, name, mask, trained, pasts[k])
         ]
         of_runs = scattered_scores([run for _, run in unseen], by_run=folds.by_run)

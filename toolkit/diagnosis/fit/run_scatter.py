@@ -34,7 +34,7 @@ from toolkit.errors import FitError
 
 if TYPE_CHECKING:
     from toolkit.arrays import Array
-    from toolkit.diagnosis.fit.folds import Folds, HeldOut
+    from toolkit.diagnosis.fit.folds import HeldOut
     from toolkit.diagnosis.fit.problem import Problem
 
 
@@ -213,13 +213,13 @@ def _taken_by_own(problem: Problem, made: Fit, columns: Mapping[str, Array], at:
     return max(shares)
 
 
-def held_out_beside_scatter(problem: Problem, folds: Folds, held_out: HeldOut) -> HeldOut:
+def held_out_beside_scatter(problem: Problem, held_out: HeldOut) -> HeldOut:
     """Return unseen rows by fits that have their values as a fit of all rows has: beside zeros and gains.
 
     A size and the share of the error that it takes are then of one kind of fit. The scores stay.
     """
     simulated = {name: column.copy() for name, column in held_out.simulated.items()}
-    for mask, trained in zip(folds.held, held_out.fits, strict=True):
+    for mask, trained in held_out.fits:
         seen = replace(problem, kept={name: kept & ~mask for name, kept in problem.kept.items()})
         with contextlib.suppress(FitError):  # the fit stays what it is
             beside, scatter = with_run_scatter(seen, trained)

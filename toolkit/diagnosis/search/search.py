@@ -448,7 +448,7 @@ def _beside_scatter(
         return _beside_scatter(problem, folds, bare, scores, listed)
     if not scatter:
         return scattered, held_base, steps, scatter
-    beside = held_out_beside_scatter(problem, folds, held_base)
+    beside = held_out_beside_scatter(problem, held_base)
     # One step of least squares leads to the values beside a scatter. Of runs that differ by a third of their
     # size it may lead astray: then unseen rows, which it was to serve, are the worse for it.
     if matters(problem, beside, held_base, STEP.later):
