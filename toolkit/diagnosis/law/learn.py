@@ -19,8 +19,8 @@ from toolkit.diagnosis.fit.fit import sizes_off
 from toolkit.diagnosis.fit.folds import hold_out, matters, unseen_error
 from toolkit.diagnosis.fit.sensor_noise import noise_parts
 from toolkit.diagnosis.law.foretelling import taken_for_noise
-from toolkit.diagnosis.law.ranking import p_value, ranked
-from toolkit.diagnosis.law.row_to_row import shown_from_row_to_row, shown_in_place
+from toolkit.diagnosis.law.ranking import p_value, ranked, ranked_in_place
+from toolkit.diagnosis.law.row_to_row import shown_from_row_to_row
 from toolkit.diagnosis.law.terms import joint_terms_of, pulses_of, terms_of
 from toolkit.diagnosis.law.trial import (
     Trial,
@@ -228,7 +228,7 @@ def _next(
         _, best_trial, refit = fitted[0]
         tried = {trial.place for _, trial, _ in fitted}
         others = [trial for trial in trials if trial.place not in tried]
-        in_place = shown_in_place(problem, refit, best_trial, others, weight)[: LAWS.in_place]
+        in_place = ranked_in_place(problem, refit, best_trial, others, weight)[: LAWS.in_place]
         fitted = _best_first(
             [*fitted, *_fitted(problem, base, [(trial, refit.p) for trial in in_place], weight)]
         )

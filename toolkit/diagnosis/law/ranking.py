@@ -12,6 +12,7 @@ import numpy as np
 
 from toolkit.diagnosis.law.trial import Trial, amplitudes
 from toolkit.diagnosis.policy import LAWS
+from toolkit.diagnosis.search.screen import LinearisedFit
 from toolkit.diagnosis.simulators.simulator import TermPattern
 from toolkit.effects.applied import AppliedEffect
 from toolkit.effects.law import ITSELF, parts_of
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from toolkit.arrays import Array
     from toolkit.diagnosis.fit.fit import Fit
     from toolkit.diagnosis.fit.problem import Problem
-    from toolkit.diagnosis.search.screen import LinearisedFit
     from toolkit.effects.formula import Formula
 
     Stacked = dict[str, Array]
@@ -100,6 +100,38 @@ def ranked(
             gain, coefficients, trust = screen.gain(directions)
             exact.append(replace(at_coefficients(trial, coefficients), gain=gain * trust))
     return sorted(exact, key=lambda trial: -(trial.gain - 2 * weight * trial.cost))
+
+
+def ranked_in_place(
+    problem: Problem, refit: Fit, law: Trial, trials: Sequence[Trial], weight: float
+) -> list[Trial]:
+    """Return laws of an equation that would take the place of one that was fitted, the best first.
+
+    A refit without any is far from where the plant was, and a ranking there knows little of shapes. Beside
+    the first good law the simulation is where it should be, and what that does there another has to do.
+
+    Parameters
+    ----------
+    refit : with the law, at its end
+    trials : laws at their starts; those that have no memory and enter an equation are asked
+    """
+    asked = [trial for trial in trials if trial.acts == "enters" and trial.form == "static"]
+    if law.acts != "enters" or law.form != "static" or law.partner is not None or not asked:
+        return []
+    applied = refit.active[-1]
+    (does,) = all_responses(problem, refit, [replace(law, applied=applied)])
+    if does is None:
+        return []
+    sizes = [applied.values[name] for name in amplitudes(applied)]
+    moved = {name: columns @ sizes for name, columns in does.items()}
+    held = replace(applied, effect=replace(applied.effect, discrete=True))
+    without = replace(
+        refit,
+        active=(*refit.active[:-1], held),
+        residual={name: refit.residual[name] + change for name, change in moved.items()},
+        simulated={name: refit.simulated[name] - change for name, change in moved.items()},
+    )
+    return ranked(problem, without, LinearisedFit.of(problem, without), asked, weight)
 
 
 def likely(

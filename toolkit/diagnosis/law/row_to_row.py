@@ -1,8 +1,7 @@
-"""Laws of an equation as they show where the plant was, and not where a refit without them has gone.
+"""Laws of an equation that its prediction errors propose, from row to row along the recording.
 
 Where something large is missing, a refit has driven the parameters off, and the free simulation is elsewhere
-than the plant: a limit of what it can no longer reach does not show there. From row to row along the
-recording it does, and beside a first law that has led the simulation back.
+than the plant: a limit of what it can no longer reach does not show there. Along the recording it does.
 """
 
 from __future__ import annotations
@@ -12,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from toolkit.diagnosis.law.ranking import all_responses, at_coefficients, p_value, pattern_of, ranked
+from toolkit.diagnosis.law.ranking import at_coefficients, p_value, pattern_of
 from toolkit.diagnosis.law.trial import amplitudes
 from toolkit.diagnosis.policy import FOLLOWING, LAWS, PRIORS
 from toolkit.diagnosis.search.prediction_errors import errors_along
-from toolkit.diagnosis.search.screen import LinearisedFit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -61,38 +59,6 @@ def shown_from_row_to_row(
         if errors.share(entry[0].gain) > FOLLOWING.least and p_value(entry[0], len(trials)) < LAWS.alpha
     ]
     return sorted(shown, key=lambda entry: -worth(entry[0]))
-
-
-def shown_in_place(
-    problem: Problem, refit: Fit, law: Trial, trials: Sequence[Trial], weight: float
-) -> list[Trial]:
-    """Return laws of an equation that would take the place of one that was fitted, the best first.
-
-    A refit without any is far from where the plant was, and a ranking there knows little of shapes. Beside
-    the first good law the simulation is where it should be, and what that does there another has to do.
-
-    Parameters
-    ----------
-    refit : with the law, at its end
-    trials : laws at their starts; those that have no memory and enter an equation are asked
-    """
-    asked = [trial for trial in trials if trial.acts == "enters" and trial.form == "static"]
-    if law.acts != "enters" or law.form != "static" or law.partner is not None or not asked:
-        return []
-    applied = refit.active[-1]
-    (does,) = all_responses(problem, refit, [replace(law, applied=applied)])
-    if does is None:
-        return []
-    sizes = [applied.values[name] for name in amplitudes(applied)]
-    moved = {name: columns @ sizes for name, columns in does.items()}
-    held = replace(applied, effect=replace(applied.effect, discrete=True))
-    without = replace(
-        refit,
-        active=(*refit.active[:-1], held),
-        residual={name: refit.residual[name] + change for name, change in moved.items()},
-        simulated={name: refit.simulated[name] - change for name, change in moved.items()},
-    )
-    return ranked(problem, without, LinearisedFit.of(problem, without), asked, weight)
 
 
 def _answered(errors: PredictionErrors, trials: Sequence[Trial], limit: int) -> Iterator[tuple[Trial, Array]]:

@@ -194,12 +194,12 @@ def judged_of(file: Mapping[str, Any]) -> Judged:
     is printed.
     """
     grade, repair = file["grade"], file["repair"]
-    if grade == "no_recording" or grade == "unreadable":
-        return grade  # type: ignore[no-any-return]
-    if grade in CLEAN:
-        return "right"
-    if grade == "altered_cells":
-        return "altered"
+    of_grade: dict[str, Judged] = {
+        "no_recording": "no_recording", "unreadable": "unreadable", "altered_cells": "altered",
+        **dict.fromkeys(CLEAN, "right"),
+    }  # fmt: skip
+    if grade in of_grade:
+        return of_grade[grade]
     if disputed(file):
         return "disputed"
     if repair is None:
