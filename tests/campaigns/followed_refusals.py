@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.campaigns.next_runs import AHEAD, Plant, T, fitted, lead, written
+from tests.campaigns.next_runs import AHEAD, drawn, fitted, lead, written
 from tests.campaigns.sealed_classes import fitted_again, named
 from tests.coverage.rows import exact_interval
 from tests.planning.class_factory import problem
@@ -49,12 +49,7 @@ class Followed:
 def followed(number: int, seed: int, folder: Path) -> Followed | str:
     """Return what followed from a refusal, or why the case does not count."""
     rng = np.random.default_rng([seed, number])
-    plant = Plant(
-        lags=bool(rng.integers(2)), seconds=float(rng.uniform(0.01, 0.06)), gain=float(rng.normal(100, 3)),
-        noise=float(rng.uniform(0.5, 2.0)),
-    )  # fmt: skip
-    frequency = rng.uniform(0.1, 0.3)
-    inputs = [rng.uniform(1, 2) * np.sin(2 * np.pi * frequency * T) * np.minimum(T, 1.0) for _ in range(2)]
+    plant, inputs = drawn(rng)
     slow = float(np.exp(rng.uniform(np.log(0.02), np.log(0.3))))
     case = written(folder / "before", plant, inputs, rng, None)
     posed = problem(case)

@@ -104,15 +104,22 @@ def random_change(search: RunSearch, rng: np.random.Generator) -> Change:
             return change
 
 
-def one(number: int, seed: int, folder: Path) -> dict[str, str] | None:
-    """Return right, wrong or open for each kind of run; None where the recordings name one already."""
-    rng = np.random.default_rng([seed, number])
+def drawn(rng: np.random.Generator) -> tuple[Plant, list[np.ndarray]]:
+    """Return a plant and the inputs of two runs, slow sines of one frequency."""
     plant = Plant(
         lags=bool(rng.integers(2)), seconds=float(rng.uniform(0.01, 0.06)), gain=float(rng.normal(100, 3)),
         noise=float(rng.uniform(0.5, 2.0)),
     )  # fmt: skip
     frequency = rng.uniform(0.1, 0.3)
-    inputs = [rng.uniform(1, 2) * np.sin(2 * np.pi * frequency * T) * np.minimum(T, 1.0) for _ in range(2)]
+    return plant, [
+        rng.uniform(1, 2) * np.sin(2 * np.pi * frequency * T) * np.minimum(T, 1.0) for _ in range(2)
+    ]
+
+
+def one(number: int, seed: int, folder: Path) -> dict[str, str] | None:
+    """Return right, wrong or open for each kind of run; None where the recordings name one already."""
+    rng = np.random.default_rng([seed, number])
+    plant, inputs = drawn(rng)
     case = written(folder / "before", plant, inputs, rng, None)
     posed = problem(case)
     members = fitted(posed)
