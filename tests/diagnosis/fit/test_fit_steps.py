@@ -42,4 +42,4 @@ def test_nor_do_they_move_where_a_fold_is_held_out(problem):
     steps = AppliedEffect(effect=effect("quantisation"), channel="F", values={"step": STEP})
     whole = fit(problem, (steps,))
     held = hold_out(problem, folds_of(problem, whole), (steps,), whole)
-    assert [trained.active[0].values["step"] for trained in held.fits] == [STEP] * len(held.fits)
+    assert [trained.active[0].values["step"] for _, trained in held.fits] == [STEP] * len(held.fits)
